@@ -1,0 +1,1 @@
+"""Annotate the faces of signers: recordings in, ELAN tiers out."""

@@ -1,0 +1,32 @@
+"""The one error a user can mend.
+
+Everything a user can put right (a missing file, a marker that is not in the layout, a neutral time outside the
+take) is raised as `SignfaceError`. The command line prints its message as one line and exits with status 2.
+"""
+
+from __future__ import annotations
+
+from os import PathLike
+
+
+class SignfaceError(Exception):
+    """Something the user can mend: what file, what is wrong, what to do.
+
+    Parameters
+    ----------
+    problem : str
+        What is wrong, as a short clause without a final full stop.
+    file : path, optional
+        The file concerned; it opens the message.
+    hint : str, optional
+        What to do about it; it closes the message.
+    """
+
+    def __init__(self, problem: str, *, file: str | PathLike[str] | None = None, hint: str | None = None) -> None:
+        self.problem = problem
+        self.file = None if file is None else str(file)
+        self.hint = hint
+        message = problem if self.file is None else f"{self.file}: {problem}"
+        if hint:
+            message = f"{message}. {hint[0].upper()}{hint[1:]}"
+        super().__init__(" ".join(message.split()))

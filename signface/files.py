@@ -1,0 +1,70 @@
+"""Files that appear whole or not at all, and the folder of data that ships with signface.
+
+- `whole_file`: write beside the target, then rename over it.
+- `models_folder`, `shipped`: where the default face, the layouts and the trained classifiers live.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Iterator
+from os import PathLike
+from pathlib import Path
+
+from signface.errors import SignfaceError
+
+
+@contextlib.contextmanager
+def whole_file(path: str | PathLike[str]) -> Iterator[Path]:
+    """Give a temporary path beside `path`; it replaces `path` if the block ends well, and vanishes if not.
+
+    Parameters
+    ----------
+    path : path
+        The file to write. Its folder is created when missing.
+
+    Yields
+    ------
+    Path
+        Where to write. It has the same suffix as `path`, so that writers which look at the ending agree.
+
+    Raises
+    ------
+    SignfaceError
+        The folder cannot be created or written.
+    """
+    target = Path(path)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
+        os.close(handle)
+    except OSError as error:
+        raise SignfaceError(
+            f"cannot be written ({error.strerror})", file=target, hint="choose a folder you may write to"
+        ) from error
+    temporary = Path(name)
+    try:
+        yield temporary
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(0o666 & ~umask)  # mkstemp makes it private; a result is shared as any other file
+        if target.is_dir():
+            raise SignfaceError("is a folder, not a file", file=target, hint="name a file to write")
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def models_folder() -> Path:
+    """The folder of shipped data: `signface/models` in an installed package, `models/` in a checkout."""
+    here = Path(__file__).resolve().parent
+    installed = here / "models"
+    return installed if installed.is_dir() else here.parent / "models"
+
+
+def shipped(kind: str, suffix: str) -> dict[str, Path]:
+    """Names and files of the shipped data of one kind (`faces`, `layouts`, `classifiers`), sorted by name."""
+    folder = models_folder() / kind
+    return {file.name[: -len(suffix)]: file for file in sorted(folder.glob(f"*{suffix}"))}

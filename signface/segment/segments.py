@@ -1,0 +1,89 @@
+"""`Segments`: stretches of time, stable or transition, later with a label and a confidence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from signface.errors import SignfaceError
+from signface.files import whole_file
+
+KINDS = ("stable", "transition")
+
+
+@dataclass(frozen=True)
+class Segments:
+    """A table of segments in time order, without overlap.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Columns `start_s`, `end_s` (seconds, start < end) and `kind` (`stable` or `transition`); after labelling
+        also `label` and `confidence` (0 to 1).
+    name : str
+        Name of the take.
+    history : tuple of str
+        What was done, oldest first.
+    """
+
+    table: pd.DataFrame
+    name: str = "take"
+    history: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        table = self.table.reset_index(drop=True)
+        missing = [column for column in ("start_s", "end_s", "kind") if column not in table.columns]
+        if missing:
+            raise SignfaceError(f"{self.name}: a table of segments needs the columns {', '.join(missing)}")
+        start, end = table["start_s"].to_numpy(float), table["end_s"].to_numpy(float)
+        if not (np.isfinite(start).all() and np.isfinite(end).all() and (start < end).all()):
+            raise SignfaceError(f"{self.name}: every segment must end after it starts")
+        if (start[1:] < end[:-1] - 1e-9).any():
+            raise SignfaceError(f"{self.name}: segments overlap or are out of order")
+        unknown = sorted(set(table["kind"]) - set(KINDS))
+        if unknown:
+            raise SignfaceError(f"{self.name}: unknown kind of segment: {', '.join(map(str, unknown))}")
+        object.__setattr__(self, "table", table)
+        object.__setattr__(self, "history", tuple(self.history))
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+    @property
+    def labelled(self) -> bool:
+        """Whether the segments carry labels."""
+        return "label" in self.table.columns
+
+    def changed(self, operation: str, table: pd.DataFrame) -> Segments:
+        """A copy with another table and `operation` appended to the history."""
+        return Segments(table, name=self.name, history=(*self.history, operation))
+
+
+def write_segments(segments: Segments, path: str | PathLike[str]) -> None:
+    """Write the table as .csv, times to the tenth of a millisecond."""
+    if Path(path).suffix.lower() != ".csv":
+        raise SignfaceError("segments are written as .csv", file=path)
+    with whole_file(path) as temporary:
+        segments.table.to_csv(temporary, index=False, float_format="%.4f")
+
+
+def read_segments(path: str | PathLike[str]) -> Segments:
+    """Read a table written by `write_segments`.
+
+    Raises
+    ------
+    SignfaceError
+        The file is missing or is no table of segments.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise SignfaceError("no such file", file=file)
+    try:
+        table = pd.read_csv(file)
+    except (ValueError, pd.errors.ParserError, pd.errors.EmptyDataError) as error:
+        raise SignfaceError("cannot be read as a table of segments", file=file) from error
+    return Segments(table, name=file.stem, history=(f"read_segments {file.name}",))
