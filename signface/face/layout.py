@@ -49,7 +49,7 @@ class MarkerLayout:
         bad = sorted(set(roles) - set(ROLES))
         if bad:
             raise SignfaceError(f"{self.name}: unknown role {', '.join(bad)}", hint="a role is face or head")
-        standing = (corners >= 0).all(axis=1)
+        standing = np.asarray((corners >= 0).all(axis=1))
         loose = [label for label, role, on in zip(labels, roles, standing) if role == "face" and not on]
         if loose:
             raise SignfaceError(f"{self.name}: face markers without a vertex: {', '.join(loose[:5])}")
