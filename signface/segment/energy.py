@@ -1,0 +1,159 @@
+"""Energy curves of a take: how fast its blendshape weights move.
+
+- `energies`: the two curves of the thesis (eq. 4.4 and 4.5) and their combination.
+- `Energies`: what it returns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from signface.descriptors import Descriptors
+from signface.errors import SignfaceError
+
+#: Rate below which weights are first interpolated, so that a slow recording is differentiated like a fast one (Hz).
+FINE_RATE = 100.0
+
+
+@dataclass(frozen=True)
+class Energies:
+    """Energy curves of a take.
+
+    Parameters
+    ----------
+    time : (K,) float64 array
+        Times in seconds: those of the frames, with evenly spaced ones between them when the take is slower than
+        `FINE_RATE`.
+    velocity : (K,) float64 array
+        Sum over the bases of the absolute velocity of the weights (1/s).
+    acceleration : (K,) float64 array
+        Sum over the bases of the absolute acceleration of the weights (1/s^2).
+    time_constant_s : float
+        The time that makes the acceleration comparable with the velocity, in seconds.
+    """
+
+    time: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    time_constant_s: float
+
+    @property
+    def combined(self) -> np.ndarray:
+        """(K,) `velocity**2 + (time_constant_s * acceleration)**2` (1/s^2)."""
+        return self.velocity**2 + (self.time_constant_s * self.acceleration) ** 2
+
+    @property
+    def activity(self) -> np.ndarray:
+        """(K,) square root of `combined` (1/s): the same peaks, on a scale that is linear in the weights."""
+        return np.sqrt(self.combined)
+
+
+def energies(descriptors: Descriptors, *, window_s: float = 0.23, time_constant_s: float = 0.15) -> Energies:
+    """Velocity and acceleration energies of the weights of a take (thesis 4.4.2, eq. 4.4 and 4.5).
+
+    The derivatives are those of a parabola fitted to the weights in a sliding window (Savitzky-Golay). The window is
+    given in seconds, so that the same motion has the same energies at any rate; near the ends of the take the
+    parabola of the last whole window is used.
+
+    The thesis adds `E_vel^2 + E_acc^2` although one is in 1/s and the other in 1/s^2, so that the acceleration
+    drowns the velocity, and the more so the shorter the unit of time. Here the acceleration is multiplied by a time
+    constant. For a weight that moves along a raised cosine lasting T the two peaks are equal when the constant is
+    `T / pi`, and velocity and acceleration then take turns, so that a whole transition makes one hump instead of two
+    or three. 0.15 s belongs to transitions of about half a second. A constant time, rather than a level of each take,
+    leaves the curve of a moment independent of the rest of its take.
+
+    Parameters
+    ----------
+    descriptors : Descriptors
+        At least three frames. Frames without weights (NaN) are bridged in a straight line, per base.
+    window_s : float
+        Width of the sliding window in seconds. A take shorter than it is differentiated with a shorter one.
+    time_constant_s : float
+        See above, in seconds.
+
+    Returns
+    -------
+    Energies
+        K is the number of frames, or more when the rate is below `FINE_RATE`.
+
+    Raises
+    ------
+    SignfaceError
+        There are fewer than three frames, or no frame has weights.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from signface.descriptors import Descriptors
+    >>> ramp = np.linspace(0, 1, 101)[:, None]  # one base rising by 1 in a second
+    >>> curves = energies(Descriptors(ramp, ("jawOpen",), rate=100))
+    >>> round(float(curves.velocity[50]), 6), round(float(curves.acceleration[50]), 6)
+    (1.0, 0.0)
+    """
+    if descriptors.n_frames < 3:
+        raise SignfaceError(
+            f"{descriptors.name}: {descriptors.n_frames} frames are too few for an energy curve",
+            hint="a rate of change needs three frames",
+        )
+    if window_s <= 0 or time_constant_s <= 0:
+        raise SignfaceError("the window and the time constant of the energies must be positive seconds")
+    weights = bridged(descriptors)
+    factor = max(1, int(np.ceil(FINE_RATE / descriptors.rate)))
+    time, weights = _refined(descriptors.time, weights, factor)
+    rate = descriptors.rate * factor
+    window = _window_frames(window_s, rate, len(time))
+    derivative = {
+        order: savgol_filter(weights, window, polyorder=2, deriv=order, delta=1 / rate, axis=0, mode="interp")
+        for order in (1, 2)
+    }
+    return Energies(
+        time=time,
+        velocity=np.abs(derivative[1]).sum(axis=1),
+        acceleration=np.abs(derivative[2]).sum(axis=1),
+        time_constant_s=time_constant_s,
+    )
+
+
+def bridged(descriptors: Descriptors) -> np.ndarray:
+    """(F, N) weights in which frames without weights lie on the straight line between their neighbours.
+
+    At the ends of the take the nearest known weights are held.
+
+    Raises
+    ------
+    SignfaceError
+        No frame has weights.
+    """
+    known = np.isfinite(descriptors.weights).all(axis=1)
+    if not known.any():
+        raise SignfaceError(
+            f"{descriptors.name}: no frame has weights", hint="look at the markers of the take: signface take info"
+        )
+    if known.all():
+        return descriptors.weights
+    frames = np.arange(descriptors.n_frames)
+    columns = [np.interp(frames, frames[known], column[known]) for column in descriptors.weights.T]
+    return np.column_stack(columns)
+
+
+def _refined(time: np.ndarray, weights: np.ndarray, factor: int) -> tuple[np.ndarray, np.ndarray]:
+    """Times and weights with `factor - 1` frames put between each two, on a cubic spline."""
+    if factor == 1:
+        return time, weights
+    from scipy.interpolate import make_interp_spline
+
+    fine = np.linspace(time[0], time[-1], factor * (len(time) - 1) + 1)
+    return fine, make_interp_spline(time, weights, k=min(3, len(time) - 1), axis=0)(fine)
+
+
+def _window_frames(window_s: float, rate: float, frames: int) -> int:
+    """The odd number of frames, at least 3, whose window is closest to `window_s` in its second moment.
+
+    N frames spread like a continuous window of `sqrt(N^2 - 1) / rate` seconds, not of `N / rate`.
+    """
+    ideal = np.sqrt(1 + (window_s * rate) ** 2)
+    window = max(3, 2 * round((ideal - 1) / 2) + 1)
+    return min(window, frames if frames % 2 else frames - 1)
