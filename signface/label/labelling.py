@@ -1,0 +1,192 @@
+"""Labels for the segments of a take (thesis 4.4.3).
+
+- `segment_means`: the mean descriptor of each segment (eq. 4.6).
+- `label_segments`: the labelled segments.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from signface.descriptors import Descriptors
+from signface.errors import SignfaceError
+from signface.label.model import Model
+from signface.label.vocabulary import join
+from signface.segment.segments import Segments
+
+#: Frames per second that the confidence of a segment is averaged over.
+CONFIDENCE_RATE = 25.0
+
+#: How much of a transition at the end of the take stands for the expression outside it (s).
+EDGE_S = 0.05
+
+
+def segment_means(descriptors: Descriptors, spans: np.ndarray) -> np.ndarray:
+    """(S, N) mean weights of the frames of each span (eq. 4.6); NaN for a span without any.
+
+    Parameters
+    ----------
+    descriptors : Descriptors
+    spans : (S, 2) array
+        Start and end of each span in seconds; the frames with `start <= time < end` belong to it, and a span that
+        falls between two frames takes the nearest one.
+    """
+    means = np.full((len(spans), descriptors.weights.shape[1]), np.nan)
+    for row, (start, end) in enumerate(spans):
+        frames = _frames(descriptors, start, end)
+        if len(frames):
+            means[row] = descriptors.weights[frames].mean(axis=0)
+    return means
+
+
+def label_segments(descriptors: Descriptors, segments: Segments, model: Model) -> Segments:
+    """Label the segments of a take.
+
+    A stable segment gets the label that the classifier gives to its mean descriptor (eq. 4.6). Its confidence is the
+    probability of that label averaged over the segment's frames: a face that changes inside a segment, or lies
+    between two expressions, lowers it, whichever the classifier.
+
+    A transition is named by its neighbours (`NA`), and its confidence is the product of theirs, since its name is
+    right when both are. Where it comes from or leads to nothing because the take begins or ends in it, the first or
+    last `EDGE_S` of the take stand for the neighbour. A transition between two equal labels is no transition of the
+    expression (a blink, a mouthed word): it is taken, with its neighbours, into one stable segment, whose confidence
+    is the mean of theirs by duration.
+
+    A stable segment in which no frame has weights takes the label of the one before it (or after, at the start),
+    with confidence 0.
+
+    Parameters
+    ----------
+    descriptors : Descriptors
+        The take.
+    segments : Segments
+        Its segments, from `signface.segment.segmentation.segment`.
+    model : Model
+
+    Returns
+    -------
+    Segments
+        With the columns `label` and `confidence`; neighbours have unequal labels.
+
+    Raises
+    ------
+    SignfaceError
+        The model was trained on other bases, or no segment has weights.
+    """
+    columns = model.columns(descriptors)
+    states = _states(segments)
+    if states:
+        labels, confidences = _judged(descriptors, np.array([state.sample for state in states]), columns, model)
+        states = [
+            replace(state, label=label, confidence=confidence)
+            for state, label, confidence in zip(states, labels, confidences, strict=True)
+        ]
+    table = _table(_without_repetition(states))
+    return segments.changed(f"label {model.name} ({model.card.classifier})", table)
+
+
+@dataclass(frozen=True)
+class _State:
+    """An expression held from `start` to `end`, judged by the frames of `sample`.
+
+    It has no duration where a transition has no stable neighbour. `moving` says that a transition leads to it.
+    """
+
+    start: float
+    end: float
+    sample: tuple[float, float]
+    moving: bool
+    label: str = ""
+    confidence: float = 0.0
+
+
+def _states(segments: Segments) -> list[_State]:
+    """The stable segments, and one of no duration wherever a transition lacks a stable neighbour."""
+    states: list[_State] = []
+    previous = "transition"
+    rows = list(segments.table[["start_s", "end_s", "kind"]].itertuples(index=False))
+    for number, (start, end, kind) in enumerate(rows):
+        if kind == "stable":
+            states.append(_State(start, end, (start, end), moving=number > 0 and previous == "transition"))
+        else:
+            if previous == "transition":
+                states.append(_State(start, start, (start, min(start + EDGE_S, end)), moving=number > 0))
+            if number == len(rows) - 1:
+                states.append(_State(end, end, (max(end - EDGE_S, start), end), moving=True))
+        previous = kind
+    return states
+
+
+def _judged(
+    descriptors: Descriptors, samples: np.ndarray, columns: list[int], model: Model
+) -> tuple[list[str], list[float]]:
+    """Label and confidence of each state."""
+    means = segment_means(descriptors, samples)[:, columns]
+    seen = np.isfinite(means).all(axis=1)
+    if not seen.any():
+        raise SignfaceError(f"{descriptors.name}: no segment has weights, so none can be labelled")
+    classes = model.card.labels
+    chosen = np.full(len(samples), -1)
+    chosen[seen] = [classes.index(label) for label in model.estimator.predict(means[seen])]
+    confidences = np.zeros(len(samples))
+    thinned = [_thinned(descriptors, start, end) for start, end in samples]
+    probabilities = model.probabilities(descriptors.weights[np.ix_(np.concatenate(thinned), columns)])
+    first = 0
+    for row, frames in enumerate(thinned):
+        if seen[row]:
+            confidences[row] = probabilities[first : first + len(frames), chosen[row]].mean()
+        first += len(frames)
+    nearest = np.flatnonzero(seen)
+    for row in np.flatnonzero(~seen):  # the expression before goes on, or at the start the one after was there
+        before = nearest[nearest < row]
+        chosen[row] = chosen[before[-1] if len(before) else nearest[0]]
+    return [classes[index] for index in chosen], confidences.tolist()
+
+
+def _frames(descriptors: Descriptors, start: float, end: float) -> np.ndarray:
+    """Indices of the frames with `start <= time < end`, at least the nearest one, that have weights."""
+    tiny = 1e-6 / descriptors.rate  # a boundary that stands on a frame but for rounding
+    first = int(np.ceil((start - descriptors.start) * descriptors.rate - tiny))
+    last = int(np.ceil((end - descriptors.start) * descriptors.rate - tiny))
+    if last <= first:
+        first = round(((start + end) / 2 - descriptors.start) * descriptors.rate)
+        last = first + 1
+    frames = np.arange(max(first, 0), min(last, descriptors.n_frames))
+    return frames[np.isfinite(descriptors.weights[frames]).all(axis=1)]
+
+
+def _thinned(descriptors: Descriptors, start: float, end: float) -> np.ndarray:
+    """Some `CONFIDENCE_RATE` frames per second of the span, evenly spaced, at least one if there is any."""
+    frames = _frames(descriptors, start, end)
+    count = min(len(frames), max(1, round((end - start) * CONFIDENCE_RATE)))
+    return frames[((np.arange(count) + 0.5) * len(frames) / max(count, 1)).astype(int)]
+
+
+def _without_repetition(states: list[_State]) -> list[_State]:
+    """The states with runs of one label made into one state."""
+    kept: list[_State] = []
+    for state in states:
+        if kept and kept[-1].label == state.label:
+            before = kept[-1]
+            durations = np.array([before.end - before.start, state.end - state.start]) + 1e-9
+            confidence = float(np.average([before.confidence, state.confidence], weights=durations))
+            kept[-1] = replace(before, end=state.end, confidence=confidence)
+        else:
+            kept.append(state)
+    return kept
+
+
+def _table(states: list[_State]) -> pd.DataFrame:
+    """The rows of the states and of the transitions between them."""
+    rows: list[tuple[float, float, str, str, float]] = []
+    for number, state in enumerate(states):
+        if state.moving and number > 0:
+            before = states[number - 1]
+            name = join(before.label, state.label)
+            rows.append((before.end, state.start, "transition", name, before.confidence * state.confidence))
+        if state.end > state.start:
+            rows.append((state.start, state.end, "stable", state.label, state.confidence))
+    return pd.DataFrame(rows, columns=["start_s", "end_s", "kind", "label", "confidence"])

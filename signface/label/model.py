@@ -1,0 +1,100 @@
+"""`Model`: a trained classifier together with what it was trained on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from signface.descriptors import Descriptors
+from signface.errors import SignfaceError
+
+if TYPE_CHECKING:
+    from sklearn.base import ClassifierMixin
+
+
+@dataclass(frozen=True)
+class Card:
+    """What a model is and where it comes from; it can be read without loading the estimator.
+
+    Parameters
+    ----------
+    classifier : str
+        A name of `signface.label.labellers.NAMES`.
+    bases : tuple of str
+        Names of the bases whose weights it was trained on, in their order.
+    labels : tuple of str
+        The labels it can give.
+    face, layout, corpus : str
+        Names of the face, the marker layout(s) and the corpus of the training takes.
+    kinds, signers, takes : tuple of str
+        What of the corpus it was trained on.
+    frames : int
+        Number of training frames, after thinning.
+    seed : int
+        Seed of the training.
+    scores : mapping of str to float
+        Measured accuracies, each under a name that says on what.
+    version : str
+        Version of signface that trained it.
+    """
+
+    classifier: str
+    bases: tuple[str, ...]
+    labels: tuple[str, ...]
+    face: str = "unknown"
+    layout: str = "unknown"
+    corpus: str = "unknown"
+    kinds: tuple[str, ...] = ()
+    signers: tuple[str, ...] = ()
+    takes: tuple[str, ...] = ()
+    frames: int = 0
+    seed: int = 0
+    scores: Mapping[str, float] = field(default_factory=dict)
+    version: str = ""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A trained classifier and its card."""
+
+    estimator: ClassifierMixin
+    card: Card
+    name: str = "model"
+
+    def columns(self, descriptors: Descriptors) -> list[int]:
+        """Which columns of the weights are the model's bases, in the model's order.
+
+        Bases that the model does not know are left out.
+
+        Raises
+        ------
+        SignfaceError
+            The take lacks some of the model's bases; the message names what differs.
+        """
+        place = {name: column for column, name in enumerate(descriptors.names)}
+        missing = [name for name in self.card.bases if name not in place]
+        if missing:
+            extra = [name for name in descriptors.names if name not in self.card.bases]
+            also = f", and has {_few(extra)} instead" if extra else ""
+            raise SignfaceError(
+                f"{self.name}: the classifier was trained on other bases than {descriptors.name} has: "
+                f"the take lacks {_few(missing)}{also}",
+                hint=f"solve the take with the face it was trained on ({self.card.face}), or train a classifier "
+                "on this face: signface train",
+            )
+        return [place[name] for name in self.card.bases]
+
+    def probabilities(self, weights: np.ndarray) -> np.ndarray:
+        """(K, labels) probability of each of `card.labels` for (K, bases) weights without NaN."""
+        if len(weights) == 0:
+            return np.zeros((0, len(self.card.labels)))
+        return self.estimator.predict_proba(weights)  # type: ignore[attr-defined]
+
+
+def _few(names: list[str], most: int = 5) -> str:
+    """`a, b, c` or `a, b, c, d, e and 7 more`."""
+    shown = ", ".join(names[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"

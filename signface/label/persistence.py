@@ -1,0 +1,187 @@
+"""Trained classifiers on disk: skops files, which hold no code, with the model's card beside the estimator.
+
+- `save_model`, `load_model`: write and read a trained classifier.
+- `read_card`: what a file holds, without loading the estimator.
+- `find_model`: a shipped classifier by its name, or a file.
+
+A file is the zip archive that skops writes, with one more entry, `signface.json`, the card. Object identities in
+skops' own schema are memory addresses, and zip entries carry the time of day; both are replaced by counters and a
+fixed date, so that the same training writes the same bytes.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from dataclasses import asdict, fields
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from signface.errors import SignfaceError
+from signface.files import shipped, whole_file
+from signface.label.model import Card, Model
+
+CARD = "signface.json"
+SCHEMA = "schema.json"
+
+#: Types that a file may hold beside the ones skops itself trusts. None of them runs code of the file's choosing.
+TRUSTED = (
+    "sklearn.calibration._CalibratedClassifier",
+    "sklearn.calibration._SigmoidCalibration",
+    "sklearn.model_selection._split.StratifiedKFold",
+    "sklearn.tree._tree.Tree",
+)
+
+#: No trained classifier of ours unpacks to more (bytes): a small file that does is no honest one.
+LARGEST = 2 * 1024**3
+
+
+def save_model(model: Model, path: str | PathLike[str]) -> None:
+    """Write a trained classifier as a .skops file.
+
+    Raises
+    ------
+    SignfaceError
+        The ending is not .skops, or the folder cannot be written.
+    """
+    import skops.io
+
+    if Path(path).suffix.lower() != ".skops":
+        raise SignfaceError("the ending of a classifier is .skops", file=path)
+    written = skops.io.dumps(model.estimator)
+    with zipfile.ZipFile(io.BytesIO(written)) as archive:
+        schema, names = _canonical(json.loads(archive.read(SCHEMA)))
+        contents = {new: archive.read(old) for old, new in names.items()}
+    contents[SCHEMA] = json.dumps(schema).encode()
+    contents[CARD] = json.dumps(asdict(model.card), indent=1, ensure_ascii=False).encode()
+    with whole_file(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
+        for name in (CARD, SCHEMA, *sorted(set(contents) - {CARD, SCHEMA})):
+            entry = zipfile.ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0))
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, contents[name], compresslevel=9)
+
+
+def read_card(path: str | PathLike[str]) -> Card:
+    """The card of a saved classifier, without loading the estimator.
+
+    Raises
+    ------
+    SignfaceError
+        The file is missing, cut off, or no classifier of signface.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise SignfaceError("no such file", file=file)
+    try:
+        with zipfile.ZipFile(file) as archive:
+            if CARD not in archive.namelist():
+                raise SignfaceError(
+                    "is no classifier of signface (it has no card)", file=file, hint="train one with signface train"
+                )
+            content = json.loads(archive.read(CARD))
+        return _card(content)
+    except (zipfile.BadZipFile, OSError, EOFError, zipfile.zlib.error, ValueError, KeyError, TypeError) as error:
+        raise SignfaceError(
+            "is no classifier of signface, or is cut off", file=file, hint="train one with signface train"
+        ) from error
+
+
+def load_model(path: str | PathLike[str]) -> Model:
+    """Read a trained classifier.
+
+    Nothing of the file is run: it may hold only types that skops trusts and those of `TRUSTED`.
+
+    Raises
+    ------
+    SignfaceError
+        The file is missing, cut off, no classifier of signface, holds other types, or its estimator and its card
+        do not belong together.
+    """
+    import skops.io
+
+    file = Path(path)
+    card = read_card(file)
+    try:
+        with zipfile.ZipFile(file) as archive:
+            if sum(entry.file_size for entry in archive.infolist()) > LARGEST or archive.testzip() is not None:
+                raise SignfaceError("is no classifier of signface, or is damaged", file=file)
+        data = file.read_bytes()
+        foreign = sorted(set(skops.io.get_untrusted_types(data=data)) - set(TRUSTED))
+        if foreign:
+            raise SignfaceError(
+                f"holds types that a classifier of signface does not ({', '.join(foreign[:3])}) and was not loaded",
+                file=file,
+                hint="use only files that signface train wrote",
+            )
+        estimator: Any = skops.io.loads(data, trusted=list(TRUSTED))
+        classes = tuple(str(label) for label in estimator.classes_)
+        features = int(estimator.n_features_in_)
+    except SignfaceError:
+        raise
+    except Exception as error:  # a damaged archive makes skops and scikit-learn fail in many ways
+        raise SignfaceError(
+            f"cannot be loaded as a classifier ({type(error).__name__})",
+            file=file,
+            hint=f"it was written by signface {card.version}; train it again with signface train",
+        ) from error
+    if classes != card.labels or features != len(card.bases) or not hasattr(estimator, "predict_proba"):
+        raise SignfaceError("its estimator and its card do not belong together", file=file, hint="train it again")
+    return Model(estimator, card, name=file.stem)
+
+
+def find_model(name_or_path: str | PathLike[str] = "default") -> Model:
+    """A classifier that ships with signface, by its name, or one in a file.
+
+    Raises
+    ------
+    SignfaceError
+        There is neither a shipped classifier nor a file of that name; see also `load_model`.
+    """
+    ours = shipped("classifiers", ".skops")
+    if str(name_or_path) in ours:
+        return load_model(ours[str(name_or_path)])
+    if not Path(name_or_path).exists():
+        known = ", ".join(ours) or "none"
+        raise SignfaceError(
+            "no such classifier", file=name_or_path, hint=f"name a .skops file or a shipped classifier ({known})"
+        )
+    return load_model(name_or_path)
+
+
+def _card(content: dict[str, Any]) -> Card:
+    """The card from its JSON, with lists made tuples again."""
+    known = {item.name for item in fields(Card)}
+    values = {
+        name: tuple(str(entry) for entry in value) if isinstance(value, list) else value
+        for name, value in content.items()
+        if name in known
+    }
+    card = Card(**values)
+    if not (isinstance(card.bases, tuple) and isinstance(card.labels, tuple) and isinstance(card.scores, dict)):
+        raise ValueError("the card's lists are no lists")
+    return card
+
+
+def _canonical(schema: Any) -> tuple[Any, dict[str, str]]:
+    """The schema with identities numbered in the order of appearance, and the new name of each file of the archive."""
+    numbers: dict[int, int] = {}
+    names: dict[str, str] = {}
+
+    def visit(node: Any) -> Any:
+        if isinstance(node, list):
+            return [visit(item) for item in node]
+        if not isinstance(node, dict):
+            return node
+        result = {}
+        for key, value in node.items():
+            if key == "__id__":
+                result[key] = numbers.setdefault(value, len(numbers))
+            elif key == "file" and isinstance(value, str):
+                result[key] = names.setdefault(value, f"{len(names):05d}{Path(value).suffix}")
+            else:
+                result[key] = visit(value)
+        return result
+
+    return visit(schema), names
