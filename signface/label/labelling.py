@@ -13,7 +13,7 @@ import pandas as pd
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
-from signface.label.model import Model
+from signface.label.model import TrainedModel
 from signface.label.vocabulary import join
 from signface.segment.segments import Segments
 
@@ -42,7 +42,7 @@ def segment_means(descriptors: Descriptors, spans: np.ndarray) -> np.ndarray:
     return means
 
 
-def label_segments(descriptors: Descriptors, segments: Segments, model: Model) -> Segments:
+def label_segments(descriptors: Descriptors, segments: Segments, model: TrainedModel) -> Segments:
     """Label the segments of a take.
 
     A stable segment gets the label that the classifier gives to its mean descriptor (eq. 4.6). Its confidence is the
@@ -64,7 +64,7 @@ def label_segments(descriptors: Descriptors, segments: Segments, model: Model) -
         The take.
     segments : Segments
         Its segments, from `signface.segment.segmentation.segment`.
-    model : Model
+    model : TrainedModel
 
     Returns
     -------
@@ -121,7 +121,7 @@ def _states(segments: Segments) -> list[_State]:
 
 
 def _judged(
-    descriptors: Descriptors, samples: np.ndarray, columns: list[int], model: Model
+    descriptors: Descriptors, samples: np.ndarray, columns: np.ndarray, model: TrainedModel
 ) -> tuple[list[str], list[float]]:
     """Label and confidence of each state."""
     means = segment_means(descriptors, samples)[:, columns]
@@ -129,20 +129,20 @@ def _judged(
     if not seen.any():
         raise SignfaceError(f"{descriptors.name}: no segment has weights, so none can be labelled")
     classes = model.card.labels
-    chosen = np.full(len(samples), -1)
+    chosen = np.full(len(samples), -1, dtype=int)
     chosen[seen] = [classes.index(label) for label in model.estimator.predict(means[seen])]
     confidences = np.zeros(len(samples))
     thinned = [_thinned(descriptors, start, end) for start, end in samples]
     probabilities = model.probabilities(descriptors.weights[np.ix_(np.concatenate(thinned), columns)])
-    first = 0
+    offset = 0
     for row, frames in enumerate(thinned):
         if seen[row]:
-            confidences[row] = probabilities[first : first + len(frames), chosen[row]].mean()
-        first += len(frames)
+            confidences[row] = probabilities[offset : offset + len(frames), chosen[row]].mean()
+        offset += len(frames)
     nearest = np.flatnonzero(seen)
-    for row in np.flatnonzero(~seen):  # the expression before goes on, or at the start the one after was there
-        before = nearest[nearest < row]
-        chosen[row] = chosen[before[-1] if len(before) else nearest[0]]
+    for blind in np.flatnonzero(~seen):  # the expression before goes on, or at the start the one after was there
+        before = nearest[nearest < blind]
+        chosen[blind] = chosen[before[-1] if len(before) else nearest[0]]
     return [classes[index] for index in chosen], confidences.tolist()
 
 

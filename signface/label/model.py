@@ -1,4 +1,4 @@
-"""`Model`: a trained classifier together with what it was trained on."""
+"""`TrainedModel`: a trained classifier together with what it was trained on."""
 
 from __future__ import annotations
 
@@ -57,15 +57,15 @@ class Card:
 
 
 @dataclass(frozen=True)
-class Model:
+class TrainedModel:
     """A trained classifier and its card."""
 
     estimator: ClassifierMixin
     card: Card
     name: str = "model"
 
-    def columns(self, descriptors: Descriptors) -> list[int]:
-        """Which columns of the weights are the model's bases, in the model's order.
+    def columns(self, descriptors: Descriptors) -> np.ndarray:
+        """(bases,) which columns of the weights are the model's bases, in the model's order.
 
         Bases that the model does not know are left out.
 
@@ -85,7 +85,7 @@ class Model:
                 hint=f"solve the take with the face it was trained on ({self.card.face}), or train a classifier "
                 "on this face: signface train",
             )
-        return [place[name] for name in self.card.bases]
+        return np.array([place[name] for name in self.card.bases], dtype=int)
 
     def probabilities(self, weights: np.ndarray) -> np.ndarray:
         """(K, labels) probability of each of `card.labels` for (K, bases) weights without NaN."""

@@ -2,7 +2,6 @@
 
 - `save_model`, `load_model`: write and read a trained classifier.
 - `read_card`: what a file holds, without loading the estimator.
-- `find_model`: a shipped classifier by its name, or a file.
 
 A file is the zip archive that skops writes, with one more entry, `signface.json`, the card. Object identities in
 skops' own schema are memory addresses, and zip entries carry the time of day; both are replaced by counters and a
@@ -14,6 +13,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+import zlib
 from dataclasses import asdict, fields
 from os import PathLike
 from pathlib import Path
@@ -21,7 +21,7 @@ from typing import Any
 
 from signface.errors import SignfaceError
 from signface.files import shipped, whole_file
-from signface.label.model import Card, Model
+from signface.label.model import Card, TrainedModel
 
 CARD = "signface.json"
 SCHEMA = "schema.json"
@@ -38,7 +38,7 @@ TRUSTED = (
 LARGEST = 2 * 1024**3
 
 
-def save_model(model: Model, path: str | PathLike[str]) -> None:
+def save_model(model: TrainedModel, path: str | PathLike[str]) -> None:
     """Write a trained classifier as a .skops file.
 
     Raises
@@ -63,17 +63,15 @@ def save_model(model: Model, path: str | PathLike[str]) -> None:
             archive.writestr(entry, contents[name], compresslevel=9)
 
 
-def read_card(path: str | PathLike[str]) -> Card:
-    """The card of a saved classifier, without loading the estimator.
+def read_card(name_or_path: str | PathLike[str]) -> Card:
+    """The card of a saved classifier (a shipped name or a file), without loading the estimator.
 
     Raises
     ------
     SignfaceError
         The file is missing, cut off, or no classifier of signface.
     """
-    file = Path(path)
-    if not file.is_file():
-        raise SignfaceError("no such file", file=file)
+    file = _found(name_or_path)
     try:
         with zipfile.ZipFile(file) as archive:
             if CARD not in archive.namelist():
@@ -82,14 +80,14 @@ def read_card(path: str | PathLike[str]) -> Card:
                 )
             content = json.loads(archive.read(CARD))
         return _card(content)
-    except (zipfile.BadZipFile, OSError, EOFError, zipfile.zlib.error, ValueError, KeyError, TypeError) as error:
+    except (zipfile.BadZipFile, OSError, EOFError, zlib.error, ValueError, KeyError, TypeError) as error:
         raise SignfaceError(
             "is no classifier of signface, or is cut off", file=file, hint="train one with signface train"
         ) from error
 
 
-def load_model(path: str | PathLike[str]) -> Model:
-    """Read a trained classifier.
+def load_model(name_or_path: str | PathLike[str] = "default") -> TrainedModel:
+    """Read a trained classifier: a shipped one by its name, or a file.
 
     Nothing of the file is run: it may hold only types that skops trusts and those of `TRUSTED`.
 
@@ -98,10 +96,15 @@ def load_model(path: str | PathLike[str]) -> Model:
     SignfaceError
         The file is missing, cut off, no classifier of signface, holds other types, or its estimator and its card
         do not belong together.
+
+    Examples
+    --------
+    >>> load_model("default").card.classifier  # doctest: +SKIP
+    'forest'
     """
     import skops.io
 
-    file = Path(path)
+    file = _found(name_or_path)
     card = read_card(file)
     try:
         with zipfile.ZipFile(file) as archive:
@@ -128,32 +131,23 @@ def load_model(path: str | PathLike[str]) -> Model:
         ) from error
     if classes != card.labels or features != len(card.bases) or not hasattr(estimator, "predict_proba"):
         raise SignfaceError("its estimator and its card do not belong together", file=file, hint="train it again")
-    return Model(estimator, card, name=file.stem)
+    return TrainedModel(estimator, card, name=file.stem)
 
 
-def find_model(name_or_path: str | PathLike[str] = "default") -> Model:
-    """A classifier that ships with signface, by its name, or one in a file.
-
-    Raises
-    ------
-    SignfaceError
-        There is neither a shipped classifier nor a file of that name; see also `load_model`.
-    """
+def _found(name_or_path: str | PathLike[str]) -> Path:
+    """The file of a shipped classifier, or the path itself when there is such a file."""
     ours = shipped("classifiers", ".skops")
-    if str(name_or_path) in ours:
-        return load_model(ours[str(name_or_path)])
-    if not Path(name_or_path).exists():
-        known = ", ".join(ours) or "none"
-        raise SignfaceError(
-            "no such classifier", file=name_or_path, hint=f"name a .skops file or a shipped classifier ({known})"
-        )
-    return load_model(name_or_path)
+    file = ours.get(str(name_or_path), Path(name_or_path))
+    if not file.is_file():
+        hint = f"name a .skops file or a shipped classifier ({', '.join(ours) or 'there is none'})"
+        raise SignfaceError("no such classifier", file=file, hint=hint)
+    return file
 
 
 def _card(content: dict[str, Any]) -> Card:
     """The card from its JSON, with lists made tuples again."""
     known = {item.name for item in fields(Card)}
-    values = {
+    values: dict[str, Any] = {
         name: tuple(str(entry) for entry in value) if isinstance(value, list) else value
         for name, value in content.items()
         if name in known
@@ -174,7 +168,7 @@ def _canonical(schema: Any) -> tuple[Any, dict[str, str]]:
             return [visit(item) for item in node]
         if not isinstance(node, dict):
             return node
-        result = {}
+        result: dict[str, Any] = {}
         for key, value in node.items():
             if key == "__id__":
                 result[key] = numbers.setdefault(value, len(numbers))

@@ -2,7 +2,7 @@
 
 - `Example`: a solved take with its reference annotation.
 - `training_frames`: the frames a classifier learns from.
-- `train_model`: a trained `Model`.
+- `train_model`: a trained `TrainedModel`.
 - `score_by_take`: how well it does on takes it has not seen, within the training takes.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.label.labellers import make_labeller
-from signface.label.model import Card, Model
+from signface.label.model import Card, TrainedModel
 from signface.label.vocabulary import AFFECTS
 from signface.segment.segments import Segments
 
@@ -131,7 +131,7 @@ def train_model(
     scores: Mapping[str, float] | None = None,
     rate: float = TRAINING_RATE,
     name: str = "model",
-) -> Model:
+) -> TrainedModel:
     """Train a classifier on the frames of the stable segments of annotated takes.
 
     Parameters
@@ -190,4 +190,4 @@ def train_model(
         scores=dict(scores or {}),
         version=version("signface"),
     )
-    return Model(labeller, card, name=name)
+    return TrainedModel(labeller, card, name=name)
