@@ -1,0 +1,235 @@
+"""EAF as XML: safe reading, whole writing, links to media, and the record of what signface wrote.
+
+- `read_document`: the tree of an EAF 2.5 to 3.0, or one clear error.
+- `write_document`: indented UTF-8, whole or not at all.
+- `link_urls`: absolute and relative URL of a linked file, as ELAN resolves them.
+- `written_record`, `recorded`: what signface wrote on a tier, kept in the header so that corrections can be told.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+from os import PathLike
+from pathlib import Path, PurePath, PureWindowsPath
+
+from lxml import etree
+
+from signface.errors import SignfaceError
+from signface.files import whole_file
+
+XSI = "http://www.w3.org/2001/XMLSchema-instance"
+SCHEMA_URL = "http://www.mpi.nl/tools/elan/EAFv3.0.xsd"
+
+#: Prefix of our own header properties.
+PROPERTY_PREFIX = "signface:"
+WRITTEN_PREFIX = f"{PROPERTY_PREFIX}written:"
+
+
+def read_document(path: str | PathLike[str]) -> etree._ElementTree:
+    """Parse an EAF (or its template, .etf) without resolving entities or touching the network.
+
+    Raises
+    ------
+    SignfaceError
+        The file is missing, is not XML, declares entities of its own, or is not an EAF.
+    """
+    file = Path(path)
+    if file.is_dir():
+        raise SignfaceError("is a folder, not an EAF", file=file)
+    # Entities are refused, not resolved: an EAF has no use for them, and a nested one can fill the memory.
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=True)
+    try:
+        with file.open("rb") as stream:
+            tree = etree.parse(stream, parser)
+    except FileNotFoundError as error:
+        raise SignfaceError("no such file", file=file) from error
+    except OSError as error:
+        raise SignfaceError(f"cannot be read ({error.strerror or 'input error'})", file=file) from error
+    except etree.XMLSyntaxError as error:
+        reason = (error.msg or "nothing in it").splitlines()[0]
+        raise SignfaceError(
+            f"is not well-formed XML ({reason})", file=file, hint="open it in ELAN, or go back to a backup of it"
+        ) from error
+    if tree.docinfo.internalDTD is not None:
+        raise SignfaceError("declares a document type or entities of its own, which no EAF does", file=file)
+    root = tree.getroot()
+    if root.tag != "ANNOTATION_DOCUMENT":
+        raise SignfaceError(f"is XML but no EAF (its root is {root.tag})", file=file)
+    for part in ("HEADER", "TIME_ORDER"):
+        if root.find(part) is None:
+            raise SignfaceError(f"is no complete EAF (no {part})", file=file)
+    return tree
+
+
+def write_document(tree: etree._ElementTree, path: str | PathLike[str]) -> None:
+    """Write the tree as indented UTF-8, whole or not at all."""
+    etree.indent(tree, space="    ")
+    with whole_file(path) as temporary:
+        tree.write(str(temporary), xml_declaration=True, encoding="UTF-8")
+
+
+def back_up(path: str | PathLike[str]) -> Path:
+    """Copy a file beside itself as NAME.bak, .bak1, .bak2, ...: an earlier backup is never overwritten.
+
+    Returns
+    -------
+    Path
+        The backup; an existing one when it holds the same bytes already.
+    """
+    file = Path(path)
+    content = file.read_bytes()
+    number = 0
+    while True:
+        backup = file.with_name(f"{file.name}.bak{number or ''}")
+        if not backup.exists():
+            shutil.copy2(file, backup)
+            return backup
+        if backup.read_bytes() == content:
+            return backup
+        number += 1
+
+
+def link_urls(file: str | PathLike[str], beside: str | PathLike[str]) -> tuple[str, str | None]:
+    """Absolute and relative URL of a linked file.
+
+    ELAN turns a `file:` URL into a path by cutting off its scheme, without decoding (`FileUtility.urlToAbsPath` in
+    its sources), and writes spaces and accents as they are. So do we; only what is no URI at all under the schema
+    (`%`, `#`, square brackets) is percent-encoded. A URL (`http://...`) is kept as it is.
+
+    Parameters
+    ----------
+    file : path or URL
+        The linked file; it need not exist.
+    beside : path
+        The EAF that will hold the link.
+
+    Returns
+    -------
+    absolute : str
+        `file:///...`
+    relative : str or None
+        `./...` or `../...`; None where there is no way from one to the other (two Windows drives, a URL).
+    """
+    text = os.fspath(file)
+    if re.match(r"^[a-zA-Z][a-zA-Z0-9+.-]+://", text):
+        return text, None
+    windows = isinstance(file, PureWindowsPath) or (os.name == "nt")
+    if windows:
+        target, folder = PureWindowsPath(text), PureWindowsPath(beside).parent
+        if os.name == "nt":
+            target, folder = PureWindowsPath(os.path.abspath(target)), PureWindowsPath(os.path.abspath(folder))
+        relative = _relative(target, folder)
+    else:
+        target, folder = PurePath(os.path.abspath(text)), PurePath(os.path.abspath(Path(beside).parent))
+        relative = _relative(target, folder)
+    absolute = target.as_posix()
+    share = absolute.startswith("//")
+    return ("file:" if share else "file:///") + _escape(absolute if share else absolute.lstrip("/")), relative
+
+
+def _relative(target: PurePath, folder: PurePath) -> str | None:
+    if target.anchor != folder.anchor:
+        return None
+    common = 0
+    for a, b in zip(target.parts, folder.parts):
+        if a != b:
+            break
+        common += 1
+    up = len(folder.parts) - common
+    steps = [".."] * up if up else ["."]
+    return _escape("/".join([*steps, *target.parts[common:]]))
+
+
+def _escape(text: str) -> str:
+    return "".join(f"%{ord(c):02X}" if c in "%#[]" else c for c in text)
+
+
+def set_property(root: etree._Element, name: str, value: str) -> None:
+    """Set a header property, keeping the place of one that is there."""
+    header = root.find("HEADER")
+    for element in header.findall("PROPERTY"):
+        if element.get("NAME") == name:
+            element.text = value
+            return
+    element = etree.SubElement(header, "PROPERTY", NAME=name)
+    element.text = value
+
+
+def get_property(root: etree._Element, name: str) -> str | None:
+    """Text of a header property, or None."""
+    for element in root.findall("HEADER/PROPERTY"):
+        if element.get("NAME") == name:
+            return element.text or ""
+    return None
+
+
+def written_record(rows: list[tuple[int | None, int | None, str]]) -> str:
+    """What is kept of a tier in the header: its annotations as compact JSON `[[start, end, value], ...]`."""
+    return json.dumps([list(row) for row in rows], ensure_ascii=False, separators=(",", ":"))
+
+
+def recorded(root: etree._Element) -> dict[str, list[tuple[int | None, int | None, str]]]:
+    """Tier names and the annotations that signface wrote on them, as kept in the header.
+
+    A record that cannot be read (someone edited it) is left out, so that its tier counts as the annotator's.
+    """
+    found = {}
+    for element in root.findall("HEADER/PROPERTY"):
+        name = element.get("NAME") or ""
+        if not name.startswith(WRITTEN_PREFIX):
+            continue
+        try:
+            rows = [(row[0], row[1], str(row[2])) for row in json.loads(element.text or "")]
+        except (ValueError, TypeError, IndexError, KeyError):
+            continue
+        found[name[len(WRITTEN_PREFIX) :]] = rows
+    return found
+
+
+def tier_rows(root: etree._Element) -> dict[str, list[tuple[int | None, int | None, str]]]:
+    """Every tier's annotations as (start, end, value), milliseconds, in the order of time.
+
+    A dependent annotation has the times of the annotation it hangs on; a time that the file leaves open is None.
+    Annotations whose references dangle have no times; `checking.check_document` names them.
+    """
+    times = {
+        slot.get("TIME_SLOT_ID"): int(slot.get("TIME_VALUE"))
+        for slot in root.iterfind("TIME_ORDER/TIME_SLOT")
+        if slot.get("TIME_VALUE") is not None
+    }
+    spans: dict[str | None, tuple[int | None, int | None]] = {}
+    parents: dict[str | None, str | None] = {}
+    for annotation in root.iterfind("TIER/ANNOTATION/ALIGNABLE_ANNOTATION"):
+        spans[annotation.get("ANNOTATION_ID")] = (
+            times.get(annotation.get("TIME_SLOT_REF1")),
+            times.get(annotation.get("TIME_SLOT_REF2")),
+        )
+    for annotation in root.iterfind("TIER/ANNOTATION/REF_ANNOTATION"):
+        parents[annotation.get("ANNOTATION_ID")] = annotation.get("ANNOTATION_REF")
+
+    def span(identifier: str | None) -> tuple[int | None, int | None]:
+        seen = set()
+        while identifier in parents and identifier not in seen:  # a ring of references must not hang the reader
+            seen.add(identifier)
+            identifier = parents[identifier]
+        return spans.get(identifier, (None, None))
+
+    rows: dict[str, list[tuple[int | None, int | None, str]]] = {}
+    for tier in root.iterfind("TIER"):
+        annotations = [
+            (*span(annotation.get("ANNOTATION_ID")), annotation.findtext("ANNOTATION_VALUE") or "")
+            for annotation in tier.iterfind("ANNOTATION/*")
+        ]
+        annotations.sort(key=lambda row: (row[0] is None, row[0] or 0, row[1] or 0))
+        rows[tier.get("TIER_ID") or ""] = annotations
+    return rows
+
+
+def is_unmodified_output(root: etree._Element) -> bool:
+    """Whether signface wrote every tier of the document and nobody has changed an annotation since."""
+    written = recorded(root)
+    rows = tier_rows(root)
+    return bool(written) and rows == written

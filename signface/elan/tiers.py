@@ -1,0 +1,154 @@
+"""Tiers as plain objects, before they become EAF.
+
+- `Tier`: a time-aligned tier and the tiers that depend on it by symbolic association.
+- `milliseconds`: seconds to the whole milliseconds of EAF, without gaps, overlaps or empty annotations appearing.
+- `affect_tier`: the tiers `affect@SIGNER`, `affect-confidence@SIGNER` and `intensity@SIGNER` from labelled segments.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from signface.elan.vocabularies import AFFECT, INTENSITY, Vocabulary
+from signface.errors import SignfaceError
+from signface.segment.segments import Segments
+
+
+@dataclass(frozen=True)
+class Tier:
+    """A time-aligned tier.
+
+    Parameters
+    ----------
+    name : str
+        The `TIER_ID`.
+    start_ms, end_ms : (n,) int64 array
+        Times of the annotations in milliseconds, in order, without overlap.
+    values : (n,) tuple of str
+    type_name : str
+        The linguistic type.
+    vocabulary : Vocabulary, optional
+        The closed vocabulary of the values.
+    participant : str
+    dependents : tuple of DependentTier
+    """
+
+    name: str
+    start_ms: np.ndarray
+    end_ms: np.ndarray
+    values: tuple[str, ...]
+    type_name: str
+    vocabulary: Vocabulary | None = None
+    participant: str = ""
+    dependents: tuple[DependentTier, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        if not len(self.start_ms) == len(self.end_ms) == len(self.values):
+            raise SignfaceError(f"tier {self.name}: times and values are not of one length")
+        if (self.start_ms >= self.end_ms).any() or (self.start_ms[1:] < self.end_ms[:-1]).any():
+            raise SignfaceError(f"tier {self.name}: annotations overlap, are empty or out of order")
+        if len(self.start_ms) and self.start_ms[0] < 0:
+            raise SignfaceError(f"tier {self.name}: an annotation starts before time 0")
+        if self.vocabulary is not None:
+            self.vocabulary.check(list(self.values), f"tier {self.name}")
+
+
+@dataclass(frozen=True)
+class DependentTier:
+    """A tier whose annotations hang on those of its parent by symbolic association.
+
+    Parameters
+    ----------
+    name : str
+    values : (n,) tuple of str or None
+        One for each annotation of the parent; None where there is none.
+    type_name : str
+    vocabulary : Vocabulary, optional
+    """
+
+    name: str
+    values: tuple[str | None, ...]
+    type_name: str
+    vocabulary: Vocabulary | None = None
+
+
+def milliseconds(start_s: np.ndarray, end_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Round times in seconds to whole milliseconds.
+
+    Two segments that touch (within half a millisecond) still touch afterwards, none overlaps another, and none is
+    shorter than a millisecond.
+
+    Parameters
+    ----------
+    start_s, end_s : (n,) arrays
+        In order, without overlap.
+
+    Returns
+    -------
+    start_ms, end_ms : (n,) int64 arrays
+    """
+    starts = np.floor(np.asarray(start_s, float) * 1000 + 0.5).astype(np.int64)
+    ends = np.floor(np.asarray(end_s, float) * 1000 + 0.5).astype(np.int64)
+    for i in range(len(starts)):
+        if i and (starts[i] < ends[i - 1] or abs(start_s[i] - end_s[i - 1]) < 0.0005):
+            starts[i] = ends[i - 1]
+        ends[i] = max(ends[i], starts[i] + 1)
+    return starts, ends
+
+
+def affect_tier(segments: Segments, signer: str = "", *, vocabulary: Vocabulary = AFFECT) -> Tier:
+    """The tier `affect@SIGNER` and what depends on it.
+
+    Segments that end before time 0 (a take that began before its video) are left out and one that contains it is
+    cut there: EAF has no negative times.
+
+    Parameters
+    ----------
+    segments : Segments
+        With `label`; a `confidence` column (0 to 1) gives `affect-confidence@SIGNER`, an `intensity` column (1, 2
+        or 3, missing where not annotated) gives `intensity@SIGNER`.
+    signer : str
+        Empty for a tier without `@`.
+    vocabulary : Vocabulary
+        The labels allowed.
+
+    Raises
+    ------
+    SignfaceError
+        The segments carry no label, or one outside the vocabulary.
+    """
+    if not segments.labelled:
+        raise SignfaceError(f"{segments.name}: the segments carry no labels", hint="label them first")
+    table = segments.table[segments.table["end_s"] > 0.0005]
+    start_ms, end_ms = milliseconds(table["start_s"].clip(lower=0).to_numpy(), table["end_s"].to_numpy())
+    dependents = []
+    if "confidence" in table.columns:
+        numbers = table["confidence"].to_numpy(float)
+        shown = tuple(f"{number:.2f}" if np.isfinite(number) else None for number in numbers)
+        dependents.append(DependentTier(tier_name("affect-confidence", signer), shown, "affect-confidence"))
+    if "intensity" in table.columns:
+        numbers = table["intensity"].to_numpy(float)
+        shown = tuple(str(int(number)) if np.isfinite(number) else None for number in numbers)
+        INTENSITY.check([value for value in shown if value is not None], f"{segments.name}: intensity")
+        dependents.append(DependentTier(tier_name("intensity", signer), shown, "intensity", INTENSITY))
+    return Tier(
+        tier_name("affect", signer),
+        start_ms,
+        end_ms,
+        tuple(str(label) for label in table["label"]),
+        "affect",
+        vocabulary,
+        participant=signer,
+        dependents=tuple(dependents),
+    )
+
+
+def tier_name(channel: str, signer: str) -> str:
+    """`CHANNEL@SIGNER`, or `CHANNEL` where no signer is named.
+
+    Any character that XML can hold stands as it is; control characters, which it cannot, become spaces.
+    """
+    clean = " ".join("".join(c if c.isprintable() else " " for c in signer).split())
+    return f"{channel}@{clean}" if clean else channel
