@@ -11,18 +11,10 @@ from dataclasses import dataclass
 from itertools import permutations
 
 from signface.errors import SignfaceError
+from signface.label.vocabulary import AFFECTS, COLOURS
 
-#: Name and colour of each stable expression. The colours are Okabe and Ito's, told apart by colour-blind readers;
-#: joy is blue and fear is light blue as in the thesis's figure 4.3.
-EXPRESSIONS = {
-    "N": ("neutral", (153, 153, 153)),
-    "A": ("anger", (213, 94, 0)),
-    "D": ("disgust", (0, 158, 115)),
-    "F": ("fear", (86, 180, 233)),
-    "J": ("joy", (0, 114, 178)),
-    "Sa": ("sadness", (204, 121, 167)),
-    "Su": ("surprise", (240, 228, 66)),
-}
+#: Name and colour of each stable expression.
+EXPRESSIONS = {label: (name, COLOURS[label]) for label, name in AFFECTS.items()}
 
 
 @dataclass(frozen=True)

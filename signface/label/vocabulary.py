@@ -1,6 +1,7 @@
 """The closed vocabulary of the affect channel (thesis 4.3.2).
 
 - `AFFECTS`: the seven labels of stable segments and what they stand for.
+- `COLOURS`: the colour of each.
 - `join`, `split`: the names of transitions, made of two of them.
 """
 
@@ -17,6 +18,18 @@ AFFECTS = {
     "J": "joy",
     "Sa": "sadness",
     "Su": "surprise",
+}
+
+#: label: red, green and blue (0 to 255), in ELAN and in every figure. Okabe and Ito's colours, told apart by
+#: colour-blind readers; joy is blue and fear is light blue as in the thesis's figure 4.3.
+COLOURS = {
+    "N": (153, 153, 153),
+    "A": (213, 94, 0),
+    "D": (0, 158, 115),
+    "F": (86, 180, 233),
+    "J": (0, 114, 178),
+    "Sa": (204, 121, 167),
+    "Su": (240, 228, 66),
 }
 
 

@@ -1,0 +1,120 @@
+"""The main job as one function: a recording in, labelled segments out, and an ELAN file on request.
+
+- `annotate`: recording to `Annotation` (descriptors, labelled segments, which model).
+- `write_annotation`: an `Annotation` to `TAKE.eaf`, with its curves beside it.
+- `summarise`: what was found, in plain words.
+
+The steps themselves live in their rooms; this module only puts them in a row.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from signface.descriptors import Descriptors
+from signface.errors import SignfaceError
+from signface.segment.segments import Segments
+
+if TYPE_CHECKING:
+    from signface.face.layout import MarkerLayout
+    from signface.face.model import FaceModel
+    from signface.label.persistence import TrainedModel
+    from signface.takes.take import Take
+
+
+@dataclass(frozen=True)
+class Annotation:
+    """What was found in one recording.
+
+    Parameters
+    ----------
+    descriptors : Descriptors
+        Blendshape weights, residual and head motion.
+    segments : Segments
+        Stable segments and transitions with `label` and `confidence`.
+    classifier : str
+        Name of the trained model that gave the labels.
+    """
+
+    descriptors: Descriptors
+    segments: Segments
+    classifier: str
+
+
+def annotate(
+    recording: Take | Descriptors,
+    *,
+    model: TrainedModel,
+    face: FaceModel | None = None,
+    layout: MarkerLayout | None = None,
+    neutral: str | float = "auto",
+    method: str = "thin-shell",
+    alpha: float | None = None,
+) -> Annotation:
+    """Solve, segment and label one recording (seed 001, chapters 4 and 5).
+
+    Parameters
+    ----------
+    recording : Take or Descriptors
+        What `signface.takes.reading.read_recording` returns; descriptors (weights from a phone) are not solved.
+    model : TrainedModel
+        What `signface.label.persistence.load_model` returns.
+    face : FaceModel, optional
+        The face to solve for; the shipped one by default.
+    layout : MarkerLayout, optional
+        Where the markers stand on that face; by default the shipped layout that fits the take's labels.
+    neutral : float or "auto"
+        Time in seconds of a frame with a neutral face.
+    method : str
+        One of `signface.solve.methods.METHODS`.
+    alpha : float, optional
+        Weight of the thin shell, 0 to 1; the method's own default when not given.
+
+    Raises
+    ------
+    SignfaceError
+        The recording does not fit the layout, or the model was trained on other bases.
+
+    Examples
+    --------
+    >>> from signface.label.persistence import load_model
+    >>> from signface.takes.reading import read_recording
+    >>> found = annotate(read_recording("take.c3d"), model=load_model("default"))  # doctest: +SKIP
+    >>> found.segments.table[["start_s", "end_s", "label"]]  # doctest: +SKIP
+    """
+    from signface.label.labelling import label_segments
+    from signface.segment.segmentation import segment
+
+    descriptors = describe(recording, face=face, layout=layout, neutral=neutral, method=method, alpha=alpha)
+    segments = label_segments(descriptors, segment(descriptors), model)
+    return Annotation(descriptors, segments, model.name)
+
+
+def describe(
+    recording: Take | Descriptors,
+    *,
+    face: FaceModel | None = None,
+    layout: MarkerLayout | None = None,
+    neutral: str | float = "auto",
+    method: str = "thin-shell",
+    alpha: float | None = None,
+) -> Descriptors:
+    """Descriptors of a recording: solved from markers, or passed through when they came from a phone.
+
+    Parameters and errors are those of `annotate`.
+    """
+    if isinstance(recording, Descriptors):
+        return recording
+    from signface.face.layout_files import choose_layout
+    from signface.face.reading import read_face
+    from signface.solve.solving import solve_take
+
+    face = read_face("default") if face is None else face
+    layout = choose_layout(recording.labels, face) if layout is None else layout
+    options = {} if alpha is None else {"alpha": alpha}
+    return solve_take(recording, face, layout, neutral=neutral, method=method, **options)
