@@ -1,0 +1,159 @@
+"""Marker labels: making them clean and unique in a reader, and matching them with a layout's.
+
+- `clean_labels`: what a reader does: which points have a name, and unique names for them.
+- `stripped`: a label without its subject's prefix.
+- `match_labels`, `rename_to`: the markers of a layout found in a take.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+from signface.errors import SignfaceError
+from signface.takes.take import Take
+
+#: Names that tracking software gives to points nobody has labelled: `*12`, `U_3`, `Unlabeled 7`, or nothing at all.
+UNLABELLED = re.compile(r"^$|^\*\d*$|^U_?\d+$|^(un(labell?ed|named|identified))[\s_-]*\d*$", re.IGNORECASE)
+
+#: A take with fewer than this part of a layout's markers is not a take of that layout.
+SMALLEST_MATCH = 1 / 3
+
+
+def stripped(label: str) -> str:
+    """The label without the subject's prefix: `Anna:LBRO` and `Anna:head:LBRO` are `LBRO`."""
+    return label.rpartition(":")[2].strip()
+
+
+def _folded(label: str) -> str:
+    """The label as compared when case and separators differ: `L_Brow-1` and `lbrow 1` agree."""
+    return re.sub(r"[\s_.\-]+", "", stripped(label)).casefold()
+
+
+def clean_labels(labels: Iterable[str]) -> tuple[list[int], list[str], list[str]]:
+    """Which points of a file are markers, under which unique names.
+
+    Unlabelled points (`*12`) are left out. A repeated label gets a number (`LBRO`, `LBRO~2`): which of the two is
+    right cannot be known here, and the first is the one that layouts find.
+
+    Returns
+    -------
+    (list of int, list of str, list of str)
+        Indices of the points kept, their labels, and notes for the take's history.
+    """
+    kept, names, notes = [], [], []
+    unlabelled, seen = 0, Counter[str]()
+    taken = {str(label).strip() for label in labels} if not isinstance(labels, list) else {x.strip() for x in labels}
+    repeated = []
+    for index, label in enumerate(labels):
+        name = str(label).strip()
+        if UNLABELLED.match(stripped(name)):
+            unlabelled += 1
+            continue
+        seen[name] += 1
+        if seen[name] > 1:
+            repeated.append(name)
+            number = seen[name]
+            while f"{name}~{number}" in taken:
+                number += 1
+            name = f"{name}~{number}"
+            taken.add(name)
+        kept.append(index)
+        names.append(name)
+    if unlabelled:
+        notes.append(f"ignored {unlabelled} unlabelled point{'s' * (unlabelled > 1)}")
+    if repeated:
+        notes.append(f"numbered repeated labels: {', '.join(sorted(set(repeated))[:5])}")
+    return kept, names, notes
+
+
+def match_labels(take_labels: Sequence[str], labels: Sequence[str]) -> dict[str, str]:
+    """For each wanted label that the take has, the take's own name for it.
+
+    An exact name wins; then the name without its subject's prefix, where the subject with the most matches is
+    taken (a take may hold two signers, or a signer and a prop); then the name without regard to case, spaces and
+    `_`, `-`, `.`.
+
+    Returns
+    -------
+    dict of str to str
+        `{wanted: name in the take}`, in the order of `labels`.
+    """
+    exact = set(take_labels)
+    found = {label: label for label in labels if label in exact}
+    by_subject: dict[str, dict[str, str]] = {}
+    for own in take_labels:
+        by_subject.setdefault(own.rpartition(":")[0], {})[stripped(own)] = own
+    wanted = set(labels) - set(found)
+    by_subject = dict(sorted(by_subject.items(), key=lambda entry: -len(wanted & set(entry[1]))))  # stable: file order
+    used = set(found.values())
+    for key in (stripped, _folded):
+        for own_names in by_subject.values():
+            keyed: dict[str, str] = {}
+            for own in own_names.values():
+                keyed.setdefault(key(own), own)
+            for label in labels:
+                own = keyed.get(key(label), "")
+                if label not in found and own and own not in used:
+                    found[label] = own
+                    used.add(own)
+    return {label: found[label] for label in labels if label in found}
+
+
+def close_names(missing: Sequence[str], spare: Sequence[str], most: int = 5) -> list[str]:
+    """Pairs "LBRO1 (close: LBRW1)" for the first few missing labels, with the take's spare names that resemble them."""
+    folded = {_folded(name): name for name in spare}
+    pairs = []
+    for label in missing[:most]:
+        close = difflib.get_close_matches(_folded(label), folded, n=2, cutoff=0.6)
+        pairs.append(f"{label} (close: {', '.join(folded[name] for name in close)})" if close else label)
+    if len(missing) > most:
+        pairs.append(f"and {len(missing) - most} more")
+    return pairs
+
+
+def rename_to(take: Take, labels: Sequence[str]) -> Take:
+    """The take with only the markers of `labels`, under those names and in that order.
+
+    Markers that the take does not have are left out (the solver works with those that remain) and named in the
+    history, with the names in the take that resemble them.
+
+    Parameters
+    ----------
+    take : Take
+    labels : sequence of str
+        A layout's labels.
+
+    Raises
+    ------
+    SignfaceError
+        Fewer than a third of the labels (or fewer than three) are in the take: it was recorded with another set.
+
+    Examples
+    --------
+    >>> rename_to(take, layout.labels).labels  # doctest: +SKIP
+    ('LBRO1', 'LBRO2', ...)
+    """
+    labels = list(labels)
+    found = match_labels(take.labels, labels)
+    missing = [label for label in labels if label not in found]
+    spare = [label for label in take.labels if label not in set(found.values())]
+    if len(found) < min(3, len(labels)) or len(found) < SMALLEST_MATCH * len(labels):
+        names = ", ".join(spare[:5]) + (" ..." if len(spare) > 5 else "")
+        raise SignfaceError(
+            f"only {len(found)} of the layout's {len(labels)} markers are in the take: "
+            f"no {', '.join(close_names(missing, spare))}; the take also has {names or 'nothing else'}",
+            file=take.name,
+            hint="choose the layout of this marker set or rename the markers",
+        )
+    notes = [f"rename_to {len(found)} of {len(labels)} markers"]
+    renamed = [f"{own} is {label}" for label, own in found.items() if own != label and stripped(own) != label]
+    if renamed:
+        notes.append(f"renamed: {', '.join(renamed[:5])}{' ...' * (len(renamed) > 5)}")
+    if missing:
+        notes.append(f"missing: {', '.join(close_names(missing, spare))}")
+    if spare:
+        notes.append(f"not in the layout: {', '.join(spare[:5])}{' ...' * (len(spare) > 5)}")
+    return take.changed("; ".join(notes), positions=take.select(list(found.values())), labels=tuple(found))

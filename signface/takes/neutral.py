@@ -1,0 +1,102 @@
+"""Finding a neutral frame: where the face rests.
+
+- `find_neutral`: the time of a neutral frame in seconds.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+
+import numpy as np
+
+from signface.errors import SignfaceError
+from signface.takes.rigid import apply, inverse, rigid_transforms
+from signface.takes.runs import runs
+from signface.takes.take import Take
+
+#: Speeds are means over this long, in seconds; a shorter rest is no rest.
+SMOOTHING_S, SHORTEST_S = 0.1, 0.2
+
+
+def _without_motion(positions: np.ndarray, head: np.ndarray) -> np.ndarray:
+    """Positions brought onto their own median shape by the head markers, frame by frame."""
+    shape = head[np.argmax(np.isfinite(head[..., 0]).sum(axis=1))]
+    for _ in range(2):
+        weights = (np.isfinite(head[..., 0]) & np.isfinite(shape[:, 0])).astype(float)
+        poses = inverse(rigid_transforms(np.nan_to_num(shape), head, weights))
+        poses[weights.sum(axis=1) < 3] = np.nan
+        shape = np.nanmedian(apply(poses, head), axis=0)
+    return apply(poses, positions)
+
+
+def _rolling_mean(values: np.ndarray, length: int) -> np.ndarray:
+    """Centred means over `length` values, NaN left out; NaN where all are."""
+    known = np.isfinite(values)
+    kernel = np.ones(length)
+    count = np.convolve(known, kernel, mode="same")
+    total = np.convolve(np.where(known, values, 0.0), kernel, mode="same")
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def find_neutral(take: Take, labels: Sequence[str] | None = None, *, head: Sequence[str] | None = None) -> float:
+    """Time of a neutral frame: in the longest still stretch closest to the take's median pose.
+
+    A frame's speed is the root mean square speed of its markers. Still stretches are those slower than the slowest
+    third of the take (and at least 0.2 s long). Of these the one with the greatest `duration / (1 + (d / s)^2)` is
+    taken, where `d` is the distance of its mean pose from the take's median pose and `s` the smallest such distance
+    of any stretch (or 0.5 mm): length counts among stretches that are near the median pose. In it, the frame nearest
+    to the stretch's own median pose is the answer.
+
+    Parameters
+    ----------
+    take : Take
+    labels : sequence of str, optional
+        The markers that are looked at (a layout's face markers); all by default.
+    head : sequence of str, optional
+        Head markers: when at least three are in the take, head motion is removed first. Otherwise it is removed by
+        all the markers looked at, which follow the head more than the face.
+
+    Returns
+    -------
+    float
+        Seconds, on the take's own clock.
+
+    Raises
+    ------
+    SignfaceError
+        No frame shows three markers.
+    """
+    names = [label for label in (take.labels if labels is None else labels) if label in take.labels]
+    carriers = [label for label in head or () if label in take.labels]
+    positions = take.select(names)
+    carried = take.select(carriers) if len(carriers) >= 3 else positions
+    seen = np.isfinite(positions[..., 0])
+    usable = (seen.sum(axis=1) >= min(3, len(names))) & (np.isfinite(carried[..., 0]).sum(axis=1) >= 3)
+    if not usable.any():
+        raise SignfaceError("no frame shows three markers", file=take.name, hint="give the neutral time in seconds")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # markers or frames that are missing throughout
+        still_head = _without_motion(positions, carried)
+        median = np.nanmedian(still_head, axis=0)
+        away = np.sqrt(np.nanmean(np.sum((still_head - median) ** 2, axis=2), axis=1))
+        if take.n_frames == 1:
+            return take.start
+        steps = np.sqrt(np.nanmean(np.sum(np.diff(still_head, axis=0) ** 2, axis=2), axis=1)) * take.rate
+    share = seen.mean(axis=1)
+    away[~usable | (share < 0.8 * share.max())] = np.nan  # a neutral frame shows nearly all that can be seen
+    speed = _rolling_mean(np.append(steps, steps[-1]), max(1, round(SMOOTHING_S * take.rate)))
+    known = np.isfinite(speed) & np.isfinite(away)
+    if not known.any():
+        return float(take.time[np.nanargmin(away)] if np.isfinite(away).any() else take.time[np.argmax(usable)])
+    still = known & (speed <= np.quantile(speed[known], 1 / 3))
+    stretches = [(b, e) for b, e in runs(still) if e - b >= SHORTEST_S * take.rate]
+    if not stretches:
+        return float(take.time[np.nanargmin(np.where(known, away, np.nan))])
+    distance = np.array([np.mean(away[begin:end]) for begin, end in stretches])
+    duration = np.array([(end - begin) / take.rate for begin, end in stretches])
+    scale = max(0.5, float(distance.min()))
+    begin, end = stretches[int(np.argmax(duration / (1 + (distance / scale) ** 2)))]
+    rest = still_head[begin:end]
+    own = np.sqrt(np.nanmean(np.sum((rest - np.nanmedian(rest, axis=0)) ** 2, axis=2), axis=1))
+    return float(take.time[begin + int(np.nanargmin(own))])

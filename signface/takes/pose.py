@@ -1,0 +1,139 @@
+"""`.pose` files (pose-format): MediaPipe Holistic's face landmarks as markers.
+
+Landmarks come from one camera: x and y in pixels with y down, z relative to the head and smaller towards the camera.
+They become a right-handed system with x to the signer's left, y up and z towards the camera, in millimetres. The scale
+of a picture is unknown; it is set once for a take so that the eyes are as far apart as an adult's.
+"""
+
+from __future__ import annotations
+
+import warnings
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from signface.errors import SignfaceError
+from signface.takes.take import Take
+
+FACE = "FACE_LANDMARKS"
+
+#: Pairs of landmarks (the outer and the inner corners of the eyes) and their distance in an adult, in millimetres:
+#: exocanthion to exocanthion (mean of 91.2 for men and 87.8 for women) and endocanthion to endocanthion (33.3 and
+#: 31.8), L. G. Farkas, Anthropometry of the Head and Face, 2nd edition, 1994. MediaPipe's own canonical face has 88.9
+#: between landmarks 33 and 263.
+EYE_CORNERS = (("33", "263", 89.5), ("133", "362", 32.5))
+
+#: Depth is in pixels when it varies over a face by at least this part of its width; else in picture widths.
+FLATTEST_FACE = 0.05
+
+
+def _landmarks(pose: Any, file: Path) -> tuple[np.ndarray, np.ndarray, list[str], list[str], bool]:
+    """(F, N, 3) raw landmarks, (F, N) confidence, names, notes, and whether there is a depth."""
+    names = [component.name for component in pose.header.components]
+    if FACE not in names:
+        raise SignfaceError(
+            f"the .pose file has no component {FACE}, only {', '.join(names[:6]) or 'none'}",
+            file=file,
+            hint="extract it with MediaPipe Holistic",
+        )
+    component = pose.header.components[names.index(FACE)]
+    begin = sum(len(other.points) for other in pose.header.components[: names.index(FACE)])
+    part = slice(begin, begin + len(component.points))
+    data = np.ma.getdata(pose.body.data)[:, :, part].astype(np.float64)
+    confidence = np.array(np.ma.getdata(pose.body.confidence)[:, :, part], dtype=np.float64)
+    if data.shape[0] == 0 or data.shape[1] == 0 or data.shape[2] == 0:
+        raise SignfaceError("the .pose file shows nobody", file=file, hint="extract it again")
+    notes = []
+    person = int(np.argmax((confidence > 0).sum(axis=(0, 2))))
+    if data.shape[1] > 1:
+        notes.append(f"took person {person + 1} of {data.shape[1]}, the one seen most")
+    data, confidence = data[:, person], confidence[:, person]
+    deep = data.shape[2] >= 3 and "Z" in component.format
+    landmarks = np.zeros((*data.shape[:2], 3))
+    landmarks[..., : 3 if deep else 2] = data[..., : 3 if deep else 2]
+    return landmarks, confidence, [str(point) for point in component.points], notes, deep
+
+
+def _in_pixels(landmarks: np.ndarray, width: int, height: int, deep: bool) -> tuple[np.ndarray, list[str]]:
+    """Landmarks with all three coordinates in pixels; y still down."""
+    notes = []
+    spread = np.nanmedian(np.nanmax(landmarks, axis=1) - np.nanmin(landmarks, axis=1), axis=0)
+    if np.nanmedian(np.abs(landmarks[..., :2])) <= 2.0:  # x and y are parts of the picture, not pixels
+        landmarks = landmarks * (width, height, width)
+        notes.append("coordinates were parts of the picture")
+    elif deep and spread[2] < FLATTEST_FACE * max(spread[0], spread[1]):
+        landmarks = landmarks * (1.0, 1.0, width)
+        notes.append(f"depth times the picture's width ({width})")
+    if not deep:
+        notes.append("no depth in the file: the face is flat")
+    return landmarks, notes
+
+
+def _millimetres_per_pixel(landmarks: np.ndarray, names: list[str]) -> tuple[float, str]:
+    """One scale for the take: the median 3-D distance of the corners of the eyes is an adult's."""
+    for one, other, distance in EYE_CORNERS:
+        if one in names and other in names:
+            apart = np.linalg.norm(landmarks[:, names.index(one)] - landmarks[:, names.index(other)], axis=1)
+            apart = apart[np.isfinite(apart)]
+            if len(apart) and np.median(apart) > 0:
+                return distance / float(np.median(apart)), f"landmarks {one} and {other} are {distance} mm apart"
+    raise SignfaceError("the corners of the eyes are never seen, so the scale is unknown")
+
+
+def read_pose(path: str | PathLike[str], *, unit: str | None = None) -> Take:
+    """Read the face landmarks of a `.pose` file as a take; labels are the landmarks' indices ("33", "263").
+
+    Works with the 468, the 478 (with irises) and the 128-point (contours) sets. A landmark is missing where its
+    confidence is 0. Where a file holds several people, the one seen most is taken. The scale is one number for the
+    whole take: nearer and farther from the camera remain visible as growing and shrinking.
+
+    Parameters
+    ----------
+    path : path
+    unit : str, optional
+        Not used: a picture has no unit of length. The scale is noted in the history.
+
+    Raises
+    ------
+    SignfaceError
+        The file is no whole `.pose` file, has no face landmarks, or they are never seen.
+    """
+    from pose_format import Pose
+
+    file = Path(path)
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise SignfaceError(f"cannot be read ({error.strerror})", file=file) from error
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            pose = Pose.read(content)
+    except Exception as error:  # pose-format has no error of its own: struct, Unicode, memory, type errors
+        raise SignfaceError("is a damaged .pose file", file=file, hint="extract it again") from error
+    rate = float(pose.body.fps)
+    if not (np.isfinite(rate) and rate > 0):
+        raise SignfaceError("the .pose file has the rate 0", file=file, hint="extract it again from the video")
+    landmarks, confidence, names, notes, deep = _landmarks(pose, file)
+    missing = ~(confidence > 0) | ~np.isfinite(landmarks).all(axis=2) | (np.abs(landmarks) > 1e6).any(axis=2)
+    landmarks[missing] = np.nan
+    if missing.all():
+        raise SignfaceError("no face is seen in the .pose file", file=file, hint="extract it again")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # frames without a face
+        dimensions = pose.header.dimensions
+        landmarks, depth_notes = _in_pixels(landmarks, dimensions.width, dimensions.height, deep)
+    try:
+        scale, scale_note = _millimetres_per_pixel(landmarks, names)
+    except SignfaceError as error:
+        raise SignfaceError(error.problem, file=file, hint="extract it with MediaPipe Holistic") from error
+    note = f"{scale:.4g} mm a pixel, so that {scale_note} (an adult's eyes)"
+    return Take(
+        landmarks * (scale, -scale, -scale),
+        tuple(names),
+        rate,
+        name=file.stem,
+        history=("; ".join([f"read {file.name} (.pose, {note})", *notes, *depth_notes]),),
+    )

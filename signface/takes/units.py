@@ -1,0 +1,116 @@
+"""Units of length: every reader turns what it finds into millimetres here.
+
+- `millimetres_per`: the factor of a named unit.
+- `to_millimetres`: positions and the unit a file names (or does not) to millimetres, with a note for the history.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+
+import numpy as np
+
+from signface.errors import SignfaceError
+
+#: Millimetres in one of each unit, by the spellings that motion-capture software writes.
+MILLIMETRES = {
+    **dict.fromkeys(("mm", "millimeter", "millimeters", "millimetre", "millimetres", "mms"), 1.0),
+    **dict.fromkeys(("cm", "centimeter", "centimeters", "centimetre", "centimetres", "cms"), 10.0),
+    **dict.fromkeys(("dm", "decimeter", "decimeters", "decimetre", "decimetres"), 100.0),
+    **dict.fromkeys(("m", "meter", "meters", "metre", "metres", "ms"), 1000.0),
+    **dict.fromkeys(("um", "µm", "micrometer", "micrometers", "micrometre", "micrometres"), 0.001),
+    **dict.fromkeys(("in", "inch", "inches"), 25.4),
+    **dict.fromkeys(("ft", "foot", "feet"), 304.8),
+}
+
+#: A cloud of markers (on a face, a head or a whole body) is narrower than this in metres, then in centimetres.
+WIDEST_IN_METRES, WIDEST_IN_CENTIMETRES = 4.0, 45.0
+
+
+def millimetres_per(unit: str) -> float:
+    """Millimetres in one `unit` ("mm", "cm", "m", "inches" and the like, in any case).
+
+    Raises
+    ------
+    SignfaceError
+        The unit is not one of length.
+    """
+    factor = MILLIMETRES.get(unit.strip().strip(".").lower())
+    if factor is None:
+        raise SignfaceError(f"the unit of length {unit.strip()[:20]!r} is unknown", hint="give one of mm, cm, m, in")
+    return factor
+
+
+def extent(positions: np.ndarray) -> float:
+    """Width of the marker cloud: the median over frames of the diagonal of its bounding box, in its own unit.
+
+    Parameters
+    ----------
+    positions : (F, M, 3) array
+        NaN where a marker is missing. At most some 300 frames, evenly taken, are looked at.
+
+    Returns
+    -------
+    float
+        NaN when no frame shows two markers.
+    """
+    sample = positions[:: max(1, len(positions) // 300)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # frames without any marker
+        sides = np.nanmax(sample, axis=1, initial=-np.inf) - np.nanmin(sample, axis=1, initial=np.inf)
+    diagonals = np.linalg.norm(sides, axis=1)
+    seen = (np.isfinite(sample).all(axis=2).sum(axis=1) > 1) & np.isfinite(diagonals)
+    return float(np.median(diagonals[seen])) if seen.any() else float("nan")
+
+
+def inferred_unit(positions: np.ndarray) -> str:
+    """The unit that makes the marker cloud as wide as a face (or a body) can be.
+
+    A face in metres is some 0.2 wide, in centimetres 20, in millimetres 200; a whole body is 2 in metres.
+    A cloud without extent is taken as millimetres.
+    """
+    width = extent(positions)
+    if not np.isfinite(width) or width == 0:
+        return "mm"
+    return "m" if width < WIDEST_IN_METRES else "cm" if width < WIDEST_IN_CENTIMETRES else "mm"
+
+
+def to_millimetres(
+    positions: np.ndarray, found: str | Sequence[str] | None, given: str | None = None
+) -> tuple[np.ndarray, str]:
+    """Positions in millimetres, and a note that says from which unit.
+
+    Parameters
+    ----------
+    positions : (F, M, 3) array
+    found : str or (M,) sequence of str, optional
+        The unit that the file names: one for all, or one for each marker. Empty or None when it names none.
+    given : str, optional
+        The unit that the user gives; it has the last word.
+
+    Returns
+    -------
+    ((F, M, 3) array, str)
+        Positions in millimetres; "unit m", "unit mm (given)" or "unit mm (not in the file, from the spread)".
+
+    Raises
+    ------
+    SignfaceError
+        A unit is not one of length.
+    """
+    if given is not None:
+        return positions * millimetres_per(given), f"unit {given} (given)"
+    units = [found] if isinstance(found, str) else list(found or ())
+    units = [unit.strip() for unit in units]
+    named = [unit for unit in units if unit]
+    if not named:
+        unit = inferred_unit(positions)
+        return positions * millimetres_per(unit), f"unit {unit} (not in the file, from the spread of the markers)"
+    if len(units) == 1 or len(set(unit.lower() for unit in named)) == 1:
+        return positions * millimetres_per(named[0]), f"unit {named[0]}"
+    markers = positions.shape[1]
+    each = [unit or named[0] for unit in units[:markers]]
+    each += [each[-1]] * (markers - len(each))
+    factors = np.array([millimetres_per(unit) for unit in each])
+    return positions * factors[:, None], f"units {', '.join(sorted(set(each)))} (one per marker)"
