@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from signface.descriptors import Descriptors
-from signface.errors import SignfaceError
 from signface.segment.segments import Segments
 
 if TYPE_CHECKING:
@@ -118,3 +117,92 @@ def describe(
     layout = choose_layout(recording.labels, face) if layout is None else layout
     options = {} if alpha is None else {"alpha": alpha}
     return solve_take(recording, face, layout, neutral=neutral, method=method, **options)
+
+
+def write_annotation(
+    annotation: Annotation,
+    path: str | PathLike[str],
+    *,
+    signer: str = "",
+    video: str | PathLike[str] | None = None,
+    replace: bool = False,
+) -> list[Path]:
+    """Write `TAKE.eaf`, its curves and their description for ELAN's timeseries viewer.
+
+    Parameters
+    ----------
+    annotation : Annotation
+    path : path
+        The `.eaf`; `TAKE.curves.csv` and `TAKE_tsconf.xml` appear beside it.
+    signer : str
+        Names the tiers (`affect@SIGNER`); empty for a tier `affect`.
+    video : path, optional
+        Film of the take, linked as the EAF's media.
+    replace : bool
+        Overwrite an `.eaf` in which somebody has worked; the old one is kept as a backup.
+
+    Returns
+    -------
+    list of Path
+        The files written, the `.eaf` first.
+
+    Raises
+    ------
+    SignfaceError
+        The `.eaf` exists and is not our own untouched output, or the folder cannot be written.
+    """
+    from signface.elan.curves import write_curves, write_tsconf
+    from signface.elan.export import check_writable, write_eaf
+
+    file = Path(path)
+    curves, tsconf = file.with_suffix(".curves.csv"), file.with_name(f"{file.stem}_tsconf.xml")
+    descriptors, segments = annotation.descriptors, annotation.segments
+    check_writable(file, replace=replace)  # before the curves: nothing half written
+    write_curves(descriptors, segments, curves)
+    write_tsconf(curves, tsconf)
+    residual = median_residual(descriptors)
+    properties = {
+        "model": annotation.classifier,
+        "take": descriptors.name,
+        "residual_mm": "unknown" if residual is None else f"{residual:.2f}",
+    }
+    write_eaf(
+        file,
+        segments,
+        signer=signer,
+        video=video,
+        properties=properties,
+        linked_files=(curves, tsconf),
+        replace=replace,
+    )
+    return [file, curves, tsconf]
+
+
+def median_residual(descriptors: Descriptors) -> float | None:
+    """Median over the frames of the solve's residual in millimetres; None where there was nothing to solve."""
+    assert descriptors.residual is not None
+    known = descriptors.residual[np.isfinite(descriptors.residual)]
+    return float(np.median(known)) if known.size else None
+
+
+def summarise(annotation: Annotation) -> str:
+    """What was found in a take, in plain words, on one line.
+
+    Examples
+    --------
+    `4.3 s, 5 stable segments: joy 2.1 s (80 %), neutral 1.4 s (95 %); markers fit the face to 0.9 mm`
+    """
+    from signface.label.vocabulary import AFFECTS
+
+    descriptors, table = annotation.descriptors, annotation.segments.table
+    stable = table[table["kind"] == "stable"]
+    seconds = (stable["end_s"] - stable["start_s"]).rename("seconds")
+    found = []
+    for label, total in seconds.groupby(stable["label"]).sum().sort_values(ascending=False).items():
+        own = stable["label"] == label
+        confidence = np.average(stable.loc[own, "confidence"], weights=seconds[own])
+        found.append(f"{AFFECTS.get(str(label), str(label))} {total:.1f} s (confidence {confidence:.0%})")
+    count = f"{len(stable)} stable segment" + ("" if len(stable) == 1 else "s")
+    residual = median_residual(descriptors)
+    fit = "" if residual is None else f"; the solved face lies {residual:.2f} mm from the markers (median residual)"
+    return f"{descriptors.duration:.1f} s, {count}: {', '.join(found) or 'none'}{fit}"

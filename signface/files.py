@@ -68,3 +68,10 @@ def shipped(kind: str, suffix: str) -> dict[str, Path]:
     """Names and files of the shipped data of one kind (`faces`, `layouts`, `classifiers`), sorted by name."""
     folder = models_folder() / kind
     return {file.name[: -len(suffix)]: file for file in sorted(folder.glob(f"*{suffix}"))}
+
+
+def bundled_corpus() -> Path:
+    """The folder of the small synthetic corpus: `corpora/mini` of a checkout, packaged with signface otherwise."""
+    here = Path(__file__).resolve().parent
+    installed = here / "corpora" / "mini"
+    return installed if installed.is_dir() else here.parent / "corpora" / "mini"

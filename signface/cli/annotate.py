@@ -1,0 +1,80 @@
+"""`signface annotate`: recordings in, ELAN files out."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from signface.cli.options import add_solve_arguments, output_files, read_face_and_layout
+from signface.cli.progress import progress
+from signface.errors import SignfaceError
+
+EXAMPLE = """  signface annotate take.c3d -o take.eaf
+  signface annotate recordings/*.c3d -o annotated/ --signer S1"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Fill the parser of this command."""
+    parser.add_argument("takes", nargs="+", type=Path, metavar="TAKE", help="recordings")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE_OR_FOLDER", help="an .eaf, or a folder (default: this folder)"
+    )
+    add_solve_arguments(parser)
+    parser.add_argument(
+        "--classifier", default="default", metavar="NAME_OR_FILE", help="a shipped classifier or a .skops file"
+    )
+    parser.add_argument("--signer", default="", metavar="NAME", help="names the tiers: affect@NAME")
+    parser.add_argument("--video", type=Path, metavar="FILE", help="film of the take, linked in the .eaf")
+    parser.add_argument("--figure", action="store_true", help="also draw each take's timeline (TAKE.png)")
+    parser.add_argument(
+        "--replace", action="store_true", help="overwrite .eaf files that were worked in (the old one is kept)"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Annotate every take; those that cannot be are named, and the others still are."""
+    from signface.label.persistence import load_model
+
+    takes = arguments.takes
+    if arguments.video is not None and len(takes) > 1:
+        raise SignfaceError("--video belongs to one take", hint="annotate the takes one by one")
+    if arguments.video is not None and not arguments.video.is_file():
+        raise SignfaceError("no such video", file=arguments.video)
+    files = output_files(takes, arguments.output, ".eaf")
+    face, layout = read_face_and_layout(arguments)
+    model = load_model(arguments.classifier)
+    failed = 0
+    for take, file in progress(list(zip(takes, files, strict=True)), "annotating"):
+        try:
+            annotate_file(take, file, arguments, face=face, layout=layout, model=model)
+        except SignfaceError as error:
+            if len(takes) == 1:
+                raise
+            failed += 1
+            print(f"signface: {error}", file=sys.stderr)
+    if failed:
+        print(f"signface: {failed} of {len(takes)} takes could not be annotated", file=sys.stderr)
+    return 2 if failed else 0
+
+
+def annotate_file(take: Path, file: Path, arguments: argparse.Namespace, *, face, layout, model) -> None:
+    """Annotate one recording into one .eaf and say what was found."""
+    from signface.annotation import annotate, summarise, write_annotation
+    from signface.takes.reading import read_recording
+
+    found = annotate(
+        read_recording(take),
+        model=model,
+        face=face,
+        layout=layout,
+        neutral=arguments.neutral,
+        method=arguments.method,
+        alpha=arguments.alpha,
+    )
+    write_annotation(found, file, signer=arguments.signer, video=arguments.video, replace=arguments.replace)
+    if arguments.figure:
+        from signface.report.timeline import draw_timeline, save_figure
+
+        save_figure(draw_timeline(found.descriptors, found.segments), file.with_suffix(".png"))
+    print(f"{file}: {summarise(found)}")

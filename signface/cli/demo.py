@@ -1,0 +1,47 @@
+"""`signface demo`: annotate the takes that ship with signface, and say what was found."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from signface.errors import SignfaceError
+
+EXAMPLE = "  signface demo -o demo-output"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Fill the parser of this command."""
+    parser.add_argument(
+        "-o", "--output", type=Path, default=Path("demo-output"), metavar="FOLDER", help="default: %(default)s"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Annotate the bundled takes into a folder, with a figure of each."""
+    from signface.annotation import annotate, summarise, write_annotation
+    from signface.cli.progress import progress
+    from signface.corpus.manifest import read_corpus
+    from signface.files import bundled_corpus
+    from signface.label.persistence import load_model
+    from signface.report.timeline import draw_timeline, save_figure
+    from signface.takes.reading import read_recording
+
+    corpus = read_corpus(bundled_corpus())
+    model = load_model("default")
+    found = []
+    for entry in progress(corpus.takes, "annotating"):
+        file = arguments.output / f"{entry.path.stem}.eaf"
+        annotation = annotate(
+            read_recording(entry.path), model=model, neutral="auto" if entry.neutral_s is None else entry.neutral_s
+        )
+        written = write_annotation(annotation, file, signer=entry.signer, replace=True)
+        save_figure(draw_timeline(annotation.descriptors, annotation.segments), file.with_suffix(".png"))
+        found.append((written[0], annotation))
+    if not found:
+        raise SignfaceError("no take ships with this copy of signface", hint="use a checkout of the project")
+    print("\nThe bundled takes are synthetic: no person was recorded. What signface found in them:\n")
+    for file, annotation in found:
+        print(f"  {file}\n      {summarise(annotation)}")
+    print(f"\nOpen one of the .eaf files above in ELAN, or look at the pictures: {arguments.output}/*.png")
+    return 0
