@@ -130,6 +130,8 @@ def write_weights(descriptors: Descriptors, path: str | PathLike[str]) -> None:
     table = descriptors.table()
     with whole_file(path) as temporary:
         if suffix == ".csv":
+            # A rate is recovered from the times: a microsecond's rounding would show in a take of few frames.
+            table["time_s"] = [f"{time:.9f}" for time in table["time_s"]]
             table.to_csv(temporary, index=False, float_format="%.6f")
         else:
             table.to_parquet(temporary, index=False)
@@ -173,7 +175,7 @@ def read_weights(path: str | PathLike[str]) -> Descriptors:
     if not np.isfinite(time).all() or step <= 0 or np.abs(steps - step).max() > 0.25 * step:
         raise SignfaceError("the times in time_s do not rise evenly", file=file, hint="solve the take again")
     rate = (len(time) - 1) / (time[-1] - time[0])
-    rate = round(rate, 3)  # times are written to the microsecond: 200 must not come back as 199.99997
+    rate = round(rate, 3)  # 200 must not come back as 199.9999999
     return Descriptors(
         weights=values[:, 1:-1],
         names=tuple(str(column) for column in table.columns[1:-1]),
