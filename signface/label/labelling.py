@@ -1,7 +1,8 @@
 """Labels for the segments of a take (thesis 4.4.3).
 
 - `segment_means`: the mean descriptor of each segment (eq. 4.6).
-- `label_segments`: the labelled segments.
+- `label_spans`: a label and a confidence for any stretches of a take, each for itself.
+- `label_segments`: the segments of a take with labels, transitions included.
 """
 
 from __future__ import annotations
@@ -42,6 +43,46 @@ def segment_means(descriptors: Descriptors, spans: np.ndarray) -> np.ndarray:
     return means
 
 
+def label_spans(descriptors: Descriptors, spans: np.ndarray, model: TrainedModel) -> tuple[list[str], list[float]]:
+    """Label and confidence of each span of a take, each judged for itself (see `label_segments`).
+
+    Parameters
+    ----------
+    descriptors : Descriptors
+    spans : (S, 2) array
+        Start and end of each span in seconds.
+    model : TrainedModel
+
+    Raises
+    ------
+    SignfaceError
+        The model was trained on other bases, or no span has weights.
+    """
+    if len(spans) == 0:
+        return [], []
+    columns = model.columns(descriptors)
+    means = segment_means(descriptors, spans)[:, columns]
+    seen = np.isfinite(means).all(axis=1)
+    if not seen.any():
+        raise SignfaceError(f"{descriptors.name}: no segment has weights, so none can be labelled")
+    classes = model.card.labels
+    chosen = np.full(len(spans), -1, dtype=int)
+    chosen[seen] = [classes.index(label) for label in model.estimator.predict(means[seen])]
+    confidences = np.zeros(len(spans))
+    thinned = [_thinned(descriptors, start, end) for start, end in spans]
+    probabilities = model.probabilities(descriptors.weights[np.ix_(np.concatenate(thinned), columns)])
+    offset = 0
+    for row, frames in enumerate(thinned):
+        if seen[row]:
+            confidences[row] = probabilities[offset : offset + len(frames), chosen[row]].mean()
+        offset += len(frames)
+    nearest = np.flatnonzero(seen)
+    for blind in np.flatnonzero(~seen):  # the expression before goes on, or at the start the one after was there
+        before = nearest[nearest < blind]
+        chosen[blind] = chosen[before[-1] if len(before) else nearest[0]]
+    return [classes[index] for index in chosen], confidences.tolist()
+
+
 def label_segments(descriptors: Descriptors, segments: Segments, model: TrainedModel) -> Segments:
     """Label the segments of a take.
 
@@ -76,14 +117,12 @@ def label_segments(descriptors: Descriptors, segments: Segments, model: TrainedM
     SignfaceError
         The model was trained on other bases, or no segment has weights.
     """
-    columns = model.columns(descriptors)
     states = _states(segments)
-    if states:
-        labels, confidences = _judged(descriptors, np.array([state.sample for state in states]), columns, model)
-        states = [
-            replace(state, label=label, confidence=confidence)
-            for state, label, confidence in zip(states, labels, confidences, strict=True)
-        ]
+    labels, confidences = label_spans(descriptors, np.array([state.sample for state in states]), model)
+    states = [
+        replace(state, label=label, confidence=confidence)
+        for state, label, confidence in zip(states, labels, confidences, strict=True)
+    ]
     table = _table(_without_repetition(states))
     return segments.changed(f"label {model.name} ({model.card.classifier})", table)
 
@@ -118,32 +157,6 @@ def _states(segments: Segments) -> list[_State]:
                 states.append(_State(end, end, (max(end - EDGE_S, start), end), moving=True))
         previous = kind
     return states
-
-
-def _judged(
-    descriptors: Descriptors, samples: np.ndarray, columns: np.ndarray, model: TrainedModel
-) -> tuple[list[str], list[float]]:
-    """Label and confidence of each state."""
-    means = segment_means(descriptors, samples)[:, columns]
-    seen = np.isfinite(means).all(axis=1)
-    if not seen.any():
-        raise SignfaceError(f"{descriptors.name}: no segment has weights, so none can be labelled")
-    classes = model.card.labels
-    chosen = np.full(len(samples), -1, dtype=int)
-    chosen[seen] = [classes.index(label) for label in model.estimator.predict(means[seen])]
-    confidences = np.zeros(len(samples))
-    thinned = [_thinned(descriptors, start, end) for start, end in samples]
-    probabilities = model.probabilities(descriptors.weights[np.ix_(np.concatenate(thinned), columns)])
-    offset = 0
-    for row, frames in enumerate(thinned):
-        if seen[row]:
-            confidences[row] = probabilities[offset : offset + len(frames), chosen[row]].mean()
-        offset += len(frames)
-    nearest = np.flatnonzero(seen)
-    for blind in np.flatnonzero(~seen):  # the expression before goes on, or at the start the one after was there
-        before = nearest[nearest < blind]
-        chosen[blind] = chosen[before[-1] if len(before) else nearest[0]]
-    return [classes[index] for index in chosen], confidences.tolist()
 
 
 def _frames(descriptors: Descriptors, start: float, end: float) -> np.ndarray:

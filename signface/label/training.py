@@ -17,6 +17,7 @@ import numpy as np
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.label.labellers import make_labeller
+from signface.label.labelling import label_spans
 from signface.label.model import Card, TrainedModel
 from signface.label.vocabulary import AFFECTS
 from signface.segment.segments import Segments
@@ -191,3 +192,42 @@ def train_model(
         version=version("signface"),
     )
     return TrainedModel(labeller, card, name=name)
+
+
+def score_by_take(
+    examples: Sequence[Example], *, classifier: str = "forest", seed: int = 0, folds: int = 5
+) -> dict[str, float]:
+    """Accuracy on takes left out of the training, among the training takes themselves.
+
+    The takes are dealt into folds, kind by kind and signer by signer; each fold in turn is left out, and the stable
+    segments of its reference are labelled by what was trained on the others. It says how well the classifier learns
+    this material, not how well it does on other material or other signers: `signface evaluate` measures that.
+
+    Parameters
+    ----------
+    examples : sequence of Example
+    classifier, seed : optional
+        See `train_model`.
+    folds : int
+        Number of folds, at most the number of takes.
+
+    Returns
+    -------
+    dict
+        One accuracy under a name that says on what; empty when there are too few takes to leave any out.
+    """
+    ordered = sorted(examples, key=lambda example: (example.signer, example.kind, example.take))
+    folds = min(folds, len(ordered))
+    right = total = 0
+    for fold in range(folds):
+        kept = [example for number, example in enumerate(ordered) if number % folds != fold]
+        try:
+            model = train_model(kept, classifier=classifier, seed=seed)
+        except SignfaceError:  # what is left shows one expression only: nothing can be said
+            return {}
+        for example in ordered[fold::folds]:
+            spans = example.stable[["start_s", "end_s"]].to_numpy(float)
+            labels, _ = label_spans(example.descriptors, spans, model)
+            right += int((np.array(labels) == example.stable["label"].to_numpy(object)).sum())
+            total += len(labels)
+    return {"accuracy on reference segments of left-out training takes": right / total} if total else {}

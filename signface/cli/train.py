@@ -1,0 +1,83 @@
+"""`signface train`: a corpus in, a trained classifier out."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from signface.cli.options import add_face_arguments
+from signface.cli.progress import progress
+from signface.errors import SignfaceError
+from signface.label.labellers import NAMES
+
+EXAMPLE = """  signface train corpora/feel -o mine.skops
+  signface train corpora/feel -o mine.skops --classifier svm-rbf --kinds IE,SE --signer each"""
+
+
+def words(text: str) -> list[str]:
+    """The words of a list with commas; for argparse."""
+    return [word.strip() for word in text.split(",") if word.strip()]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Fill the parser of this command."""
+    parser.add_argument("corpus", type=Path, metavar="CORPUS", help="folder of a corpus")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="MODEL", help="a .skops file")
+    parser.add_argument("--classifier", default="forest", choices=NAMES, help="default: %(default)s")
+    parser.add_argument("--kinds", type=words, metavar="IE,SE", help="kinds of takes to train on (default: all)")
+    parser.add_argument(
+        "--signer",
+        default="all",
+        metavar="NAME",
+        help="one signer, all of them together (default), or each: one classifier a signer, MODEL-NAME.skops",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")
+    add_face_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Solve the training takes, train, and write one classifier or one for each signer."""
+    from signface.corpus.examples import solve_examples
+    from signface.corpus.manifest import read_corpus
+    from signface.label.persistence import save_model
+    from signface.label.training import score_by_take, train_model
+
+    output = arguments.output
+    if output.suffix.lower() != ".skops":
+        raise SignfaceError("the ending of a classifier is .skops", file=output)
+    whole = read_corpus(arguments.corpus)
+    one = None if arguments.signer in ("all", "each") else [arguments.signer]
+    corpus = whole.select(kinds=arguments.kinds, signers=one)
+    annotated = sum(take.annotation is not None for take in corpus)
+    examples = solve_examples(
+        corpus,
+        face=arguments.face,
+        layout=arguments.layout,
+        progress=lambda items: progress(items, "solving", total=annotated),
+    )
+    groups = {output: examples}
+    if arguments.signer == "each":
+        groups = {
+            output.with_name(f"{output.stem}-{signer}{output.suffix}"): [e for e in examples if e.signer == signer]
+            for signer in sorted({example.signer for example in examples})
+        }
+    for file, group in groups.items():
+        scores = score_by_take(group, classifier=arguments.classifier, seed=arguments.seed)
+        model = train_model(
+            group,
+            classifier=arguments.classifier,
+            seed=arguments.seed,
+            face=Path(arguments.face).name,
+            layout="chosen by markers" if arguments.layout is None else Path(arguments.layout).name,
+            corpus=whole.folder.resolve().name,
+            scores=scores,
+            name=file.stem,
+        )
+        save_model(model, file)
+        card = model.card
+        print(
+            f"{file}: {card.classifier}, {len(card.takes)} takes ({', '.join(card.kinds)}) of "
+            f"{', '.join(card.signers)}, {card.frames} frames, labels {' '.join(card.labels)}"
+        )
+        for what, score in scores.items():
+            print(f"  {what}: {score:.2f}")

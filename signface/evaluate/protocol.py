@@ -1,0 +1,221 @@
+"""The evaluation of the thesis (4.4.3 and 4.5), for signers that were and were not trained on.
+
+- `PROTOCOLS`: what is trained on what.
+- `folds_of`: training and test takes of each signer.
+- `evaluate`: every classifier on every fold, on reference segments, automatic segments and frames.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from signface.errors import SignfaceError
+from signface.evaluate.classification import accuracy_interval, classification_metrics
+from signface.evaluate.segmentation import segmentation_metrics, value_at
+from signface.label.labellers import NAMES
+from signface.label.labelling import label_segments, label_spans
+from signface.label.model import TrainedModel
+from signface.label.training import Example, train_model
+from signface.label.vocabulary import AFFECTS
+from signface.segment.segmentation import segment
+from signface.segment.segments import Segments
+
+#: name: which takes train the classifier that a signer's test takes are given to.
+PROTOCOLS = {
+    "within": "the training kinds of the same signer",
+    "across": "the training kinds of all other signers",
+}
+
+#: Times per second at which the whole annotation is compared with the reference.
+FRAMES_RATE = 25.0
+
+#: What stands for a transition when the whole annotation is compared.
+TRANSITION = "transition"
+
+
+@dataclass(frozen=True)
+class Fold:
+    """One signer's test takes and the takes their classifiers are trained on; never the same take in both."""
+
+    signer: str
+    train: tuple[Example, ...]
+    test: tuple[Example, ...]
+
+    def __post_init__(self) -> None:
+        both = sorted({example.take for example in self.train} & {example.take for example in self.test})
+        if both:
+            raise SignfaceError(
+                f"takes would be both trained on and tested: {', '.join(both[:5])}",
+                hint="choose training kinds that are not test kinds",
+            )
+
+
+@dataclass
+class Evaluation:
+    """What `evaluate` measured.
+
+    `metrics` is the content of metrics.json (see CONTRACT.md); `by_signer` has, for each signer, the same dictionary
+    of classifiers.
+    """
+
+    metrics: dict
+    by_signer: dict[str, dict] = field(default_factory=dict)
+
+
+def folds_of(
+    examples: Sequence[Example], *, protocol: str, train_kinds: Sequence[str], test_kinds: Sequence[str]
+) -> list[Fold]:
+    """The folds of a protocol, one for each signer with test takes.
+
+    Parameters
+    ----------
+    examples : sequence of Example
+        Takes of a corpus; their names are unique.
+    protocol : str
+        One of `PROTOCOLS`.
+    train_kinds, test_kinds : sequences of str
+        Kinds of takes to train on and to test.
+
+    Raises
+    ------
+    SignfaceError
+        There is no such protocol, a take would be in both sets, a set is empty, or `across` has one signer only.
+    """
+    if protocol not in PROTOCOLS:
+        raise SignfaceError(f"there is no protocol named {protocol}", hint=f"choose {' or '.join(PROTOCOLS)}")
+    signers = sorted({example.signer for example in examples})
+    if protocol == "across" and len(signers) < 2:
+        raise SignfaceError("an unseen signer needs a corpus of two signers or more", hint="use --protocol within")
+    folds = []
+    for signer in signers:
+        test = tuple(e for e in examples if e.signer == signer and e.kind in test_kinds)
+        train = tuple(e for e in examples if (e.signer == signer) == (protocol == "within") and e.kind in train_kinds)
+        if not test:
+            continue
+        if not train:
+            raise SignfaceError(f"there is no annotated take to train on for the signer {signer}")
+        folds.append(Fold(signer, train, test))
+    if not folds:
+        raise SignfaceError(f"there is no annotated take of the kind {', '.join(test_kinds)} to test")
+    return folds
+
+
+def evaluate(
+    folds: Sequence[Fold],
+    *,
+    classifiers: Sequence[str] = tuple(NAMES),
+    seed: int = 0,
+    segments: dict[str, Segments] | None = None,
+    report: Callable[[str], object] = lambda step: None,
+) -> Evaluation:
+    """Train every classifier on every fold and compare what it says with the reference.
+
+    - *Reference segments*: the mean descriptor of each stable segment of the reference is classified.
+    - *Automatic segments*: so is that of each stable segment that `signface.segment` finds; it should have the
+      label that the reference gives to most of it. Those of which no part is stable in the reference have no right
+      label; they are counted (`without_reference`) and left out.
+    - *Frames*: the whole annotation, transitions included, is compared with the reference 25 times a second, with
+      all transitions as one further label. This is what an annotator finds on opening the file.
+
+    Parameters
+    ----------
+    folds : sequence of Fold
+    classifiers : sequence of str
+        Names of `signface.label.labellers.NAMES`.
+    seed : int
+        Seed of the classifiers and of the bootstrap.
+    segments : dict of Segments, optional
+        Automatic segments of test takes by name, where they are known already.
+    report : callable, optional
+        Called with the name of each step done.
+
+    Returns
+    -------
+    Evaluation
+    """
+    known = dict(segments or {})
+    for fold in folds:
+        for example in fold.test:
+            if example.take not in known:
+                known[example.take] = segment(example.descriptors)
+    tables = {name: {"manual_segments": [], "automatic_segments": [], "frames": []} for name in classifiers}
+    for fold in folds:
+        for name in classifiers:
+            model = train_model(fold.train, classifier=name, seed=seed, name=name)
+            for example in fold.test:
+                for section, table in _compared(example, known[example.take], model).items():
+                    tables[name][section].append(table.assign(signer=fold.signer, take=example.take))
+            report(f"{fold.signer} {name}")
+    pooled = {name: {key: pd.concat(parts) for key, parts in sections.items()} for name, sections in tables.items()}
+    test = [example for fold in folds for example in fold.test]
+    metrics = {
+        "segmentation": segmentation_metrics((e.reference.table, known[e.take].table) for e in test),
+        "classifiers": {name: _scores(sections, seed) for name, sections in pooled.items()},
+    }
+    by_signer = {
+        fold.signer: {
+            name: _scores({key: table[table.signer == fold.signer] for key, table in sections.items()}, seed)
+            for name, sections in pooled.items()
+        }
+        for fold in folds
+    }
+    return Evaluation(metrics, by_signer)
+
+
+def _compared(example: Example, found: Segments, model: TrainedModel) -> dict[str, pd.DataFrame]:
+    """Reference label and label found of each reference segment, automatic segment and frame of a take."""
+    descriptors, reference = example.descriptors, example.stable
+    manual_labels, _ = label_spans(descriptors, reference[["start_s", "end_s"]].to_numpy(float), model)
+    stable = found.table[found.table["kind"] == "stable"]
+    spans = stable[["start_s", "end_s"]].to_numpy(float)
+    automatic_labels, _ = label_spans(descriptors, spans, model)
+    labelled = label_segments(descriptors, found, model)
+    times = np.arange(descriptors.start + 0.5 / FRAMES_RATE, descriptors.start + descriptors.duration, 1 / FRAMES_RATE)
+    truth, said = (_annotation_at(segments.table, times) for segments in (example.reference, labelled))
+    annotated = truth != ""
+    return {
+        "manual_segments": pd.DataFrame({"truth": reference["label"].to_numpy(object), "found": manual_labels}),
+        "automatic_segments": pd.DataFrame({"truth": most_overlapping(spans, reference), "found": automatic_labels}),
+        "frames": pd.DataFrame({"truth": truth[annotated], "found": said[annotated]}),
+    }
+
+
+def most_overlapping(spans: np.ndarray, reference: pd.DataFrame) -> list[str]:
+    """For each span, the label that the reference's stable segments give to the longest part of it.
+
+    Empty where the span overlaps none.
+    """
+    labels = []
+    starts, ends = reference["start_s"].to_numpy(float), reference["end_s"].to_numpy(float)
+    for start, end in spans:
+        overlap = (np.minimum(ends, end) - np.maximum(starts, start)).clip(0)
+        by_label = pd.Series(overlap).groupby(reference["label"].to_numpy(object)).sum()
+        labels.append(str(by_label.idxmax()) if overlap.sum() > 0 else "")
+    return labels
+
+
+def _annotation_at(table: pd.DataFrame, times: np.ndarray) -> np.ndarray:
+    """Labels at some times, all transitions as one; empty where nothing is annotated."""
+    labels, kinds = value_at(table, "label", times), value_at(table, "kind", times)
+    return np.where(kinds == TRANSITION, TRANSITION, labels)
+
+
+def _scores(sections: dict[str, pd.DataFrame], seed: int) -> dict:
+    """The metrics of one classifier, section by section."""
+    scores = {}
+    for section, table in sections.items():
+        judged = table[table["truth"] != ""]
+        # Labels found where nothing was: an automatic annotation has no gaps, so this does not happen to frames.
+        labels = [*AFFECTS, TRANSITION] if section == "frames" else list(AFFECTS)
+        result = classification_metrics(judged["truth"].tolist(), judged["found"].tolist(), labels)
+        hits = (judged["truth"] == judged["found"]).tolist()
+        result["accuracy_interval"] = accuracy_interval(hits, judged["take"].tolist(), seed=seed)
+        result["n_takes"] = int(judged["take"].nunique())
+        if section == "automatic_segments":
+            result["without_reference"] = int(len(table) - len(judged))
+        scores[section] = result
+    return scores
