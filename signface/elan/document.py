@@ -8,10 +8,12 @@
 
 from __future__ import annotations
 
+import datetime
 import json
 import os
 import re
 import shutil
+from collections.abc import Callable
 from os import PathLike
 from pathlib import Path, PurePath, PureWindowsPath
 
@@ -116,18 +118,16 @@ def link_urls(file: str | PathLike[str], beside: str | PathLike[str]) -> tuple[s
     text = os.fspath(file)
     if re.match(r"^[a-zA-Z][a-zA-Z0-9+.-]+://", text):
         return text, None
-    windows = isinstance(file, PureWindowsPath) or (os.name == "nt")
-    if windows:
-        target, folder = PureWindowsPath(text), PureWindowsPath(beside).parent
-        if os.name == "nt":
-            target, folder = PureWindowsPath(os.path.abspath(target)), PureWindowsPath(os.path.abspath(folder))
-        relative = _relative(target, folder)
+    target: PurePath
+    folder: PurePath
+    if isinstance(file, PureWindowsPath):  # a path of another machine: it cannot be made absolute here
+        target, folder = file, PureWindowsPath(beside).parent
     else:
         target, folder = PurePath(os.path.abspath(text)), PurePath(os.path.abspath(Path(beside).parent))
-        relative = _relative(target, folder)
     absolute = target.as_posix()
-    share = absolute.startswith("//")
-    return ("file:" if share else "file:///") + _escape(absolute if share else absolute.lstrip("/")), relative
+    if absolute.startswith("//"):  # a Windows share: two slashes belong to its name
+        return "file:" + _escape(absolute), _relative(target, folder)
+    return "file:///" + _escape(absolute.lstrip("/")), _relative(target, folder)
 
 
 def _relative(target: PurePath, folder: PurePath) -> str | None:
@@ -147,6 +147,25 @@ def _escape(text: str) -> str:
     return "".join(f"%{ord(c):02X}" if c in "%#[]" else c for c in text)
 
 
+def iso_date(date: datetime.datetime | str | None) -> str:
+    """A date as `xsd:dateTime` with its zone; now when None.
+
+    Raises
+    ------
+    SignfaceError
+        The text is no ISO 8601 date.
+    """
+    if isinstance(date, str):
+        try:
+            date = datetime.datetime.fromisoformat(date)
+        except ValueError as error:
+            raise SignfaceError(f"{date} is no date", hint="write it as 2026-01-31T12:00:00+00:00") from error
+    moment = datetime.datetime.now().astimezone() if date is None else date
+    if moment.tzinfo is None:
+        moment = moment.replace(tzinfo=datetime.UTC)
+    return moment.isoformat(timespec="seconds")
+
+
 def set_property(root: etree._Element, name: str, value: str) -> None:
     """Set a header property, keeping the place of one that is there."""
     header = root.find("HEADER")
@@ -164,6 +183,57 @@ def get_property(root: etree._Element, name: str) -> str | None:
         if element.get("NAME") == name:
             return element.text or ""
     return None
+
+
+def fresh_ids(root: etree._Element) -> Callable[[str], str]:
+    """A function that gives unused identifiers (`fresh("a")`, `fresh("ts")`), numbered after those in use."""
+    used = {
+        element.get(attribute)
+        for element in root.iter("TIME_SLOT", "ALIGNABLE_ANNOTATION", "REF_ANNOTATION", *OTHER_IDENTIFIERS)
+        for attribute in ("TIME_SLOT_ID", "ANNOTATION_ID", *OTHER_IDENTIFIERS.values())
+    }
+    last = {"a": _last_number(root, "a"), "ts": 0}
+    for identifier in used:
+        match = re.fullmatch(r"(a|ts)(\d+)", identifier or "")
+        if match:
+            last[match[1]] = max(last[match[1]], int(match[2]))
+
+    def fresh(prefix: str) -> str:
+        last[prefix] += 1
+        while f"{prefix}{last[prefix]}" in used:
+            last[prefix] += 1
+        return f"{prefix}{last[prefix]}"
+
+    return fresh
+
+
+#: Elements whose identifiers share one space with those of annotations and time slots (xsd:ID).
+OTHER_IDENTIFIERS = {
+    "LOCALE": "LANGUAGE_CODE",
+    "LANGUAGE": "LANG_ID",
+    "CONSTRAINT": "STEREOTYPE",
+    "EXTERNAL_REF": "EXT_REF_ID",
+    "LEXICON_REF": "LEX_REF_ID",
+    "REF_LINK_SET": "LINK_SET_ID",
+    "CROSS_REF_LINK": "REF_LINK_ID",
+    "GROUP_REF_LINK": "REF_LINK_ID",
+}
+
+
+def _last_number(root: etree._Element, prefix: str) -> int:
+    """The number that ELAN remembers as last used, so that identifiers of deleted annotations do not come back."""
+    remembered = (get_property(root, "lastUsedAnnotationId") or "").strip()
+    return int(remembered) if prefix == "a" and remembered.isdigit() else 0
+
+
+def last_annotation_number(root: etree._Element) -> int:
+    """The highest number of an annotation `aNUMBER`, or the one remembered in the header when that is higher."""
+    numbers = [
+        int(match[1])
+        for annotation in root.iterfind("TIER/ANNOTATION/*")
+        if (match := re.fullmatch(r"a(\d+)", annotation.get("ANNOTATION_ID") or ""))
+    ]
+    return max([*numbers, _last_number(root, "a")])
 
 
 def written_record(rows: list[tuple[int | None, int | None, str]]) -> str:

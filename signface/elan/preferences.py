@@ -1,7 +1,8 @@
-"""ELAN's preferences file (`.pfsx`): the colours of vocabulary entries.
+"""ELAN's preferences file (`.pfsx`): the colours of vocabulary entries and the panels of the timeseries viewer.
 
 EAF itself has no place for colours. ELAN keeps them beside the file, in the preference group `CV.ML.Prefs`:
-vocabulary, entry id, `Color` as `r,g,b` (`PreferencesWriter` and `PrefObjectConverter` in ELAN's sources).
+vocabulary, entry id, `Color` as `r,g,b` (`PreferencesWriter` and `PrefObjectConverter` in ELAN's sources). Which
+curves are drawn is kept there too (`TimeSeriesViewer`); without it the viewer opens empty.
 """
 
 from __future__ import annotations
@@ -12,14 +13,17 @@ from pathlib import Path
 
 from lxml import etree
 
+from signface.elan.curves import panels
 from signface.elan.document import XSI, write_document
 from signface.elan.tiers import Tier
 
 PREFERENCES_SCHEMA = "http://www.mpi.nl/tools/elan/Prefs_v1.1.xsd"
 
 
-def write_preferences(path: str | PathLike[str], tiers: Sequence[Tier]) -> None:
-    """Write the colours of the tiers' vocabularies, unless there are preferences already.
+def write_preferences(
+    path: str | PathLike[str], tiers: Sequence[Tier], *, curves: str | PathLike[str] | None = None
+) -> None:
+    """Write the colours of the tiers' vocabularies and the panels of the curves, unless there are preferences.
 
     A `.pfsx` that is there holds an annotator's own window layout and colours; it is left alone.
 
@@ -28,6 +32,8 @@ def write_preferences(path: str | PathLike[str], tiers: Sequence[Tier]) -> None:
     path : path
         Beside the EAF, with the same stem.
     tiers : sequence of Tier
+    curves : path, optional
+        The curves file linked from the EAF.
     """
     file = Path(path)
     if file.exists():
@@ -52,4 +58,12 @@ def write_preferences(path: str | PathLike[str], tiers: Sequence[Tier]) -> None:
                 colour = etree.SubElement(preference, "Object")
                 colour.set("class", "java.awt.Color")
                 colour.text = ",".join(str(part) for part in entry.colour or ())
+    if curves is not None:
+        drawn = panels(curves)
+        number = etree.SubElement(root, "pref", key="TimeSeriesViewer.NumberOfPanels")
+        etree.SubElement(number, "Int").text = str(len(drawn))
+        for place, names in enumerate(drawn.values(), start=1):
+            tracks = etree.SubElement(root, "prefList", key=f"TimeSeriesViewer.Panel-{place}")
+            for name in names:
+                etree.SubElement(tracks, "String").text = name
     write_document(etree.ElementTree(root), file)

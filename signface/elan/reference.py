@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 
@@ -10,8 +11,9 @@ import pandas as pd
 from lxml import etree
 
 from signface.elan.document import read_document, tier_rows
-from signface.elan.vocabularies import AFFECT, EXPRESSIONS, INTENSITY
+from signface.elan.vocabularies import AFFECT, INTENSITY
 from signface.errors import SignfaceError
+from signface.label.vocabulary import AFFECTS
 from signface.segment.segments import Segments
 
 Row = tuple[int | None, int | None, str]
@@ -50,7 +52,7 @@ def read_reference(
     _fill_times(root)
     tiers = tier_rows(root)
     allowed = set(AFFECT.values if labels is None else labels)
-    rows = []
+    rows: list[tuple[int, int, str]] = []
     for start, end, value in tiers[name]:
         label = value.strip()
         if not label:
@@ -61,12 +63,12 @@ def read_reference(
             raise SignfaceError(
                 f"label {label!r} on tier {name} at {start / 1000:.3f} s is not in the vocabulary",
                 file=file,
-                hint=f"stable labels are {', '.join(EXPRESSIONS)}; transitions join two of them, as NA",
+                hint=f"stable labels are {', '.join(AFFECTS)}; transitions join two of them, as NA",
             )
         if rows and start < rows[-1][1]:
             raise SignfaceError(f"annotations on tier {name} overlap at {start / 1000:.3f} s", file=file)
         rows.append((start, end, label))
-    stable = set(EXPRESSIONS) if labels is None else {label for label in allowed if not _is_transition(label, allowed)}
+    stable = set(AFFECTS) if labels is None else {label for label in allowed if not _is_transition(label, allowed)}
     table = pd.DataFrame(
         {
             "start_s": [start / 1000 for start, _, _ in rows],
@@ -119,7 +121,7 @@ def _fill_times(root: etree._Element) -> None:
     """
     slots = root.findall("TIME_ORDER/TIME_SLOT")
     known = [i for i, slot in enumerate(slots) if slot.get("TIME_VALUE") is not None]
-    for before, after in zip(known, known[1:]):
+    for before, after in pairwise(known):
         start, end = int(slots[before].get("TIME_VALUE")), int(slots[after].get("TIME_VALUE"))
         for i in range(before + 1, after):
             slots[i].set("TIME_VALUE", str(start + (end - start) * (i - before) // (after - before)))

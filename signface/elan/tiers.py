@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -146,9 +147,16 @@ def affect_tier(segments: Segments, signer: str = "", *, vocabulary: Vocabulary 
 
 
 def tier_name(channel: str, signer: str) -> str:
-    """`CHANNEL@SIGNER`, or `CHANNEL` where no signer is named.
-
-    Any character that XML can hold stands as it is; control characters, which it cannot, become spaces.
-    """
-    clean = " ".join("".join(c if c.isprintable() else " " for c in signer).split())
+    """`CHANNEL@SIGNER`, or `CHANNEL` where no signer is named; the signer's name as `clean_name` gives it."""
+    clean = clean_name(signer)
     return f"{channel}@{clean}" if clean else channel
+
+
+def clean_name(text: str) -> str:
+    """A name as it stands in an attribute: `xml_text` with single spaces."""
+    return " ".join(xml_text(text).split())
+
+
+def xml_text(text: str) -> str:
+    """Text in which the characters that XML cannot hold (control characters, halves of surrogate pairs) are spaces."""
+    return re.sub("[\x00-\x08\x0b-\x1f\x7f\ud800-\udfff\ufffe\uffff]", " ", text)

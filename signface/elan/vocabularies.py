@@ -11,10 +11,7 @@ from dataclasses import dataclass
 from itertools import permutations
 
 from signface.errors import SignfaceError
-from signface.label.vocabulary import AFFECTS, COLOURS
-
-#: Name and colour of each stable expression.
-EXPRESSIONS = {label: (name, COLOURS[label]) for label, name in AFFECTS.items()}
+from signface.label.vocabulary import AFFECTS, COLOURS, join
 
 
 @dataclass(frozen=True)
@@ -80,12 +77,13 @@ class Vocabulary:
 
 
 def _affect() -> Vocabulary:
-    stable = [Entry(label, name, colour) for label, (name, colour) in EXPRESSIONS.items()]
+    stable = [Entry(label, name, COLOURS[label]) for label, name in AFFECTS.items()]
     transitions = []
-    for (start, (start_name, from_colour)), (end, (end_name, to_colour)) in permutations(EXPRESSIONS.items(), 2):
+    for before, after in permutations(AFFECTS, 2):
         # Half way between the two, and paler, so that the stable segments stand out on the tier.
-        red, green, blue = ((a + b + 2 * 255) // 4 for a, b in zip(from_colour, to_colour))
-        transitions.append(Entry(start + end, f"transition from {start_name} to {end_name}", (red, green, blue)))
+        red, green, blue = ((a + b + 2 * 255) // 4 for a, b in zip(COLOURS[before], COLOURS[after]))
+        description = f"transition from {AFFECTS[before]} to {AFFECTS[after]}"
+        transitions.append(Entry(join(before, after), description, (red, green, blue)))
     return Vocabulary(
         "affect", "Expression held or the transition between two, seven classes of affect", (*stable, *transitions)
     )
