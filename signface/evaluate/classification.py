@@ -51,7 +51,7 @@ def classification_metrics(truth: Sequence[str], found: Sequence[str], labels: S
     confusion = np.zeros((len(labels), len(labels)), dtype=int)
     np.add.at(confusion, ([place[item] for item in truth], [place[item] for item in found]), 1)
     total = int(confusion.sum())
-    result = {
+    result: dict = {
         "accuracy": None,
         "macro_f1": None,
         "n": total,

@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -110,7 +110,7 @@ def evaluate(
     classifiers: Sequence[str] = tuple(NAMES),
     seed: int = 0,
     segments: dict[str, Segments] | None = None,
-    report: Callable[[str], object] = lambda step: None,
+    progress: Callable[[Sequence[tuple[Fold, str]]], Iterable[tuple[Fold, str]]] = iter,
 ) -> Evaluation:
     """Train every classifier on every fold and compare what it says with the reference.
 
@@ -130,8 +130,8 @@ def evaluate(
         Seed of the classifiers and of the bootstrap.
     segments : dict of Segments, optional
         Automatic segments of test takes by name, where they are known already.
-    report : callable, optional
-        Called with the name of each step done.
+    progress : callable, optional
+        Wraps the list of steps, to show how far it is.
 
     Returns
     -------
@@ -142,14 +142,14 @@ def evaluate(
         for example in fold.test:
             if example.take not in known:
                 known[example.take] = segment(example.descriptors)
-    tables = {name: {"manual_segments": [], "automatic_segments": [], "frames": []} for name in classifiers}
-    for fold in folds:
-        for name in classifiers:
-            model = train_model(fold.train, classifier=name, seed=seed, name=name)
-            for example in fold.test:
-                for section, table in _compared(example, known[example.take], model).items():
-                    tables[name][section].append(table.assign(signer=fold.signer, take=example.take))
-            report(f"{fold.signer} {name}")
+    tables: dict[str, dict[str, list[pd.DataFrame]]] = {
+        name: {"manual_segments": [], "automatic_segments": [], "frames": []} for name in classifiers
+    }
+    for fold, name in progress([(fold, name) for fold in folds for name in classifiers]):
+        model = train_model(fold.train, classifier=name, seed=seed, name=name)
+        for example in fold.test:
+            for section, table in _compared(example, known[example.take], model).items():
+                tables[name][section].append(table.assign(signer=fold.signer, take=example.take))
     pooled = {name: {key: pd.concat(parts) for key, parts in sections.items()} for name, sections in tables.items()}
     test = [example for fold in folds for example in fold.test]
     metrics = {

@@ -1,0 +1,166 @@
+"""`signface evaluate`: how good segmentation and classifiers are on an annotated corpus."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+from functools import partial
+from pathlib import Path
+
+from signface.cli.options import add_face_arguments
+from signface.cli.progress import progress
+from signface.cli.train import words
+from signface.errors import SignfaceError
+
+EXAMPLE = """  signface evaluate corpora/feel -o reports/feel
+  signface evaluate corpora/feel -o reports/feel --train-kinds IE,SE --test-kinds EU --protocol across"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Fill the parser of this command."""
+    parser.add_argument("corpus", type=Path, metavar="CORPUS", help="folder of a corpus")
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="FOLDER", help="for report.html, metrics.json, confusions"
+    )
+    parser.add_argument(
+        "--train-kinds", type=words, default=["IE", "SE"], metavar="IE,SE", help="kinds trained on (default: IE,SE)"
+    )
+    parser.add_argument("--test-kinds", type=words, default=["EU"], metavar="EU", help="kinds tested (default: EU)")
+    parser.add_argument(
+        "--protocol",
+        choices=("within", "across"),
+        help="train on the same signer, or on all others (default: both, if there are two signers)",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")
+    add_face_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Solve, train, compare, write and print."""
+    from signface.corpus.examples import solve_examples
+    from signface.corpus.manifest import read_corpus
+
+    both = sorted(set(arguments.train_kinds) & set(arguments.test_kinds))
+    if both:
+        raise SignfaceError(
+            f"{', '.join(both)} would be both trained on and tested", hint="choose kinds that do not overlap"
+        )
+    if arguments.output.exists() and not arguments.output.is_dir():
+        raise SignfaceError("is a file, not a folder", file=arguments.output, hint="name a folder for the report")
+    whole = read_corpus(arguments.corpus)
+    corpus = whole.select(kinds=[*arguments.train_kinds, *arguments.test_kinds])
+    protocols = [arguments.protocol] if arguments.protocol else ["within", "across"]
+    if len(corpus.signers) < 2 and not arguments.protocol:
+        protocols = ["within"]
+    examples = solve_examples(
+        corpus,
+        face=arguments.face,
+        layout=arguments.layout,
+        progress=lambda items: progress(items, "solving", total=sum(t.annotation is not None for t in corpus)),
+    )
+    metrics = measure(examples, protocols, arguments.train_kinds, arguments.test_kinds, arguments.seed)
+    write_results(metrics, arguments.output, corpus=whole.folder.resolve().name)
+    print_results(metrics)
+    print(f"report: {arguments.output / 'report.html'}")
+
+
+def measure(examples: list, protocols: list[str], train_kinds: list[str], test_kinds: list[str], seed: int) -> dict:
+    """The content of metrics.json.
+
+    `classifiers` holds the first protocol; a second one stands under `also`, by its name.
+    """
+    from signface.evaluate.protocol import evaluate, folds_of
+    from signface.segment.segmentation import segment
+
+    segments = {e.take: segment(e.descriptors) for e in examples if e.kind in test_kinds}
+    metrics: dict = {}
+    for protocol in protocols:
+        folds = folds_of(examples, protocol=protocol, train_kinds=train_kinds, test_kinds=test_kinds)
+        shown = partial(progress, what=f"evaluating {protocol}")
+        found = evaluate(folds, seed=seed, segments=segments, progress=shown)
+        description = {
+            "name": protocol,
+            "train_kinds": train_kinds,
+            "test_kinds": test_kinds,
+            "seed": seed,
+            "folds": [
+                {
+                    "signer": fold.signer,
+                    "train_takes": [example.take for example in fold.train],
+                    "test_takes": [example.take for example in fold.test],
+                    "classifiers": found.by_signer[fold.signer],
+                }
+                for fold in folds
+            ],
+        }
+        if not metrics:
+            metrics = {**found.metrics, "protocol": description}
+        else:
+            metrics.setdefault("also", {})[protocol] = {
+                "classifiers": found.metrics["classifiers"],
+                "protocol": description,
+            }
+    return metrics
+
+
+def by_protocol(metrics: dict) -> dict[str, dict]:
+    """Protocol to its classifiers, from the content of metrics.json."""
+    others = {name: part["classifiers"] for name, part in metrics.get("also", {}).items()}
+    return {metrics["protocol"]["name"]: metrics["classifiers"], **others}
+
+
+def write_results(metrics: dict, folder: Path, *, corpus: str) -> None:
+    """Write metrics.json, report.html and a table of confusions for each protocol and classifier."""
+    from importlib.metadata import version
+
+    from signface.files import whole_file
+    from signface.report.evaluation import evaluation_page
+
+    protocols = by_protocol(metrics)
+    with whole_file(folder / "metrics.json") as temporary:
+        temporary.write_text(json.dumps(metrics, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    for protocol, classifiers in protocols.items():
+        for name, sections in classifiers.items():
+            file = folder / f"confusion_{protocol}_{name}.csv"
+            with whole_file(file) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
+                writer = csv.writer(stream, lineterminator="\n")
+                writer.writerow(["on", "reference", *sections["frames"]["labels"]])
+                for section, scores in sections.items():
+                    rows = zip(scores["labels"], scores["confusion"], strict=True)
+                    writer.writerows([section, label, *counts] for label, counts in rows)
+    folds = metrics["protocol"]["folds"]
+    settings = {
+        "trained on": ", ".join(metrics["protocol"]["train_kinds"]),
+        "tested on": ", ".join(metrics["protocol"]["test_kinds"]),
+        "signers tested": ", ".join(fold["signer"] for fold in folds),
+        "takes tested": str(sum(len(fold["test_takes"]) for fold in folds)),
+        "seed": str(metrics["protocol"]["seed"]),
+        "signface": version("signface"),
+    }
+    page = evaluation_page(corpus=corpus, segmentation=metrics["segmentation"], protocols=protocols, settings=settings)
+    with whole_file(folder / "report.html") as temporary:
+        temporary.write_text(page, encoding="utf-8")
+
+
+def print_results(metrics: dict) -> None:
+    """Print accuracies beside chance and the majority class, and how the segments agree."""
+    from signface.report.evaluation import PROTOCOL_TITLES, SECTIONS, number
+
+    for protocol, classifiers in by_protocol(metrics).items():
+        sections = next(iter(classifiers.values()))
+        rows = [["accuracy, " + PROTOCOL_TITLES[protocol], *SECTIONS.values()]]
+        rows += [[name, *(number(scores[key]["accuracy"]) for key in SECTIONS)] for name, scores in classifiers.items()]
+        rows.append(["chance", *(number(sections[key]["chance"]) for key in SECTIONS)])
+        rows.append(
+            ["majority class"]
+            + [f"{number(sections[key]['majority'])} ({sections[key]['majority_label']})" for key in SECTIONS]
+        )
+        rows.append(["n", *(str(sections[key]["n"]) for key in SECTIONS)])
+        width = max(len(row[0]) for row in rows)
+        for row in rows:
+            print(row[0].ljust(width) + "".join(cell.rjust(20) for cell in row[1:]))
+        print()
+    cut = metrics["segmentation"]
+    f1 = ", ".join(f"{value:.2f} within {tolerance} s" for tolerance, value in cut["boundary_f1"].items())
+    print(f"segments: boundary F1 {f1}; mean IoU {cut['mean_iou']:.2f}; frame agreement {cut['frame_agreement']:.2f}")
