@@ -36,7 +36,7 @@ def read_document(path: str | PathLike[str]) -> etree._ElementTree:
     Raises
     ------
     SignfaceError
-        The file is missing, is not XML, declares entities of its own, or is not an EAF.
+        The file is missing, is not XML, declares entities of its own, is not an EAF, or has times that are no numbers.
     """
     file = Path(path)
     if file.is_dir():
@@ -51,6 +51,8 @@ def read_document(path: str | PathLike[str]) -> etree._ElementTree:
     except OSError as error:
         raise SignfaceError(f"cannot be read ({error.strerror or 'input error'})", file=file) from error
     except etree.XMLSyntaxError as error:
+        if "entity amplification" in (error.msg or ""):
+            raise SignfaceError("holds XML entities that swell without end", file=file) from error
         reason = (error.msg or "nothing in it").splitlines()[0]
         raise SignfaceError(
             f"is not well-formed XML ({reason})", file=file, hint="open it in ELAN, or go back to a backup of it"
@@ -63,6 +65,13 @@ def read_document(path: str | PathLike[str]) -> etree._ElementTree:
     for part in ("HEADER", "TIME_ORDER"):
         if root.find(part) is None:
             raise SignfaceError(f"is no complete EAF (no {part})", file=file)
+    for slot in root.iterfind("TIME_ORDER/TIME_SLOT"):
+        value = slot.get("TIME_VALUE")
+        if value is not None and not value.strip().isdecimal():
+            raise SignfaceError(
+                f"time slot {slot.get('TIME_SLOT_ID')} has the time {value!r}, which is no count of milliseconds",
+                file=file,
+            )
     return tree
 
 
