@@ -23,6 +23,9 @@ from signface.takes.labels import clean_labels
 from signface.takes.take import Take
 from signface.takes.units import to_millimetres
 
+#: Frames are counted in 16 bits; ezc3d cuts longer takes without a word.
+MOST_FRAMES = 65535
+
 
 def _values(group: dict[str, Any], name: str) -> list[Any]:
     """The values of a parameter and of its continuations (`LABELS`, `LABELS2`, ...: 255 entries each at most)."""
@@ -45,9 +48,9 @@ def _rate(point: dict[str, Any], header: dict[str, Any]) -> float:
 
 
 def _first_frame(parameters: dict[str, Any], header: dict[str, Any]) -> int:
-    """Number of frames before the first one of the file: TRIAL:ACTUAL_START_FIELD (two 16-bit words), or the header's."""
+    """Number of frames before the first one of the file: TRIAL:ACTUAL_START_FIELD (two words), or the header's."""
     words = _values(parameters.get("TRIAL", {}), "ACTUAL_START_FIELD")
-    if words:
+    if words and all(isinstance(word, int | float) and math.isfinite(word) for word in words):
         low, high = int(words[0]) & 0xFFFF, int(words[1]) & 0xFFFF if len(words) > 1 else 0
         first = low + (high << 16)
         if first >= 1:
@@ -83,7 +86,7 @@ def read_c3d(path: str | PathLike[str], *, unit: str | None = None) -> Take:
     except Exception as error:  # ezc3d lets C++ errors of every kind through
         raise SignfaceError("is a C3D file that cannot be read", file=file, hint="export it again") from error
     parameters, header = content["parameters"], content["header"]["points"]
-    point = parameters["POINT"] if "POINT" in parameters else {}
+    point = parameters["POINT"]
     points = content["data"]["points"]  # (4, M, F)
     if points.size == 0:
         raise SignfaceError("the C3D file has no points", file=file, hint="export the trajectories with it")
@@ -127,14 +130,18 @@ def write_c3d(take: Take, path: str | PathLike[str]) -> None:
     Raises
     ------
     SignfaceError
-        The take starts before time 0, or the file cannot be written.
+        The take starts before time 0, has more frames than the format counts (65535), or the file cannot be written.
     """
     import ezc3d
 
     first = round(take.start * take.rate)
-    if first < 0:
-        raise SignfaceError(f"{take.name}: a C3D file cannot start before time 0", file=path, hint="shift its start")
     frames, markers = take.positions.shape[:2]
+    if not 0 <= first < 2**31:
+        raise SignfaceError(f"{take.name}: a C3D file starts at time 0 or later", file=path, hint="shift its start")
+    if frames >= MOST_FRAMES:
+        raise SignfaceError(
+            f"{take.name}: {frames} frames are too many for a C3D file", file=path, hint="write shorter takes"
+        )
     missing = np.isnan(take.positions).any(axis=2)
     points = np.ones((4, markers, frames))
     points[:3] = np.where(missing[..., None], 0.0, take.positions).transpose(2, 1, 0)
@@ -145,11 +152,9 @@ def write_c3d(take: Take, path: str | PathLike[str]) -> None:
     for number, begin in enumerate(range(0, markers, 255), start=1):
         suffix = "" if number == 1 else str(number)
         content.add_parameter("POINT", f"LABELS{suffix}", list(take.labels[begin : begin + 255]))
-    # 1-based, low word first
-    words = [(first + 1) & 0xFFFF, (first + 1) >> 16]
-    content.add_parameter("TRIAL", "ACTUAL_START_FIELD", words)
-    last = first + frames
-    content.add_parameter("TRIAL", "ACTUAL_END_FIELD", [last & 0xFFFF, last >> 16])
+    for name, frame in (("ACTUAL_START_FIELD", first + 1), ("ACTUAL_END_FIELD", first + frames)):
+        content.add_parameter("TRIAL", name, [frame & 0xFFFF, frame >> 16])  # two words, the lower one first
+        content["parameters"]["TRIAL"][name]["type"] = 2  # integers; ezc3d takes every number for a float
     content["data"]["points"] = points
     content["data"]["meta_points"]["residuals"] = np.where(missing, -1.0, 0.0).T[None]
     with whole_file(path) as temporary:

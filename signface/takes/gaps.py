@@ -1,10 +1,12 @@
 """Filling gaps in trajectories.
 
 - `fill_gaps`: short gaps by a spline, longer ones from the motion of the neighbouring markers.
-- `gap_table`: the gaps of each marker.
+- `gap_runs`: the gaps of each marker.
 """
 
 from __future__ import annotations
+
+import warnings
 
 import numpy as np
 
@@ -14,7 +16,7 @@ from signface.takes.runs import runs
 from signface.takes.take import Take
 
 #: Default limits in seconds: gaps up to the first are splined, up to the second taken from the neighbours.
-SHORT_S, LONG_S = 0.1, 0.5
+SHORT_S, LONG_S = 0.05, 0.5
 
 #: The trajectory beside a gap that its ends' velocities are taken from, in seconds.
 SUPPORT_S = 0.04
@@ -43,66 +45,73 @@ def _end(trajectory: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.nda
     return trajectory[frames[-1]], coefficients[1]
 
 
-def _spline(trajectory: np.ndarray, begin: int, end: int, support: int) -> bool:
-    """Fill one short gap in place by a cubic through both sides (Hermite's form); False where a side has no support."""
+def _spline(trajectory: np.ndarray, begin: int, end: int, support: int) -> np.ndarray | None:
+    """(end - begin, 3) positions over a short gap: a cubic that joins both sides, or None where one has no support."""
     before = np.arange(max(0, begin - support), begin)
     after = np.arange(end, min(len(trajectory), end + support))
     before = before[np.isfinite(trajectory[before, 0])]
     after = after[np.isfinite(trajectory[after, 0])]
-    before = before[before > before[-1] - support] if len(before) else before
     if len(before) < 2 or len(after) < 2:
-        return False
+        return None
     left, left_velocity = _end(trajectory, before)
     right, right_velocity = _end(trajectory, after[::-1])
-    span = end - (begin - 1)
-    t = ((np.arange(begin, end) - (begin - 1)) / span)[:, None]
-    trajectory[begin:end] = (
+    span = end - begin + 1
+    t = (np.arange(1, span) / span)[:, None]
+    return (
         (2 * t**3 - 3 * t**2 + 1) * left
         + (t**3 - 2 * t**2 + t) * span * left_velocity
         + (-2 * t**3 + 3 * t**2) * right
         + (t**3 - t**2) * span * right_velocity
     )
-    return True
 
 
-def _carry(positions: np.ndarray, known: np.ndarray, marker: int, begin: int, end: int, near: np.ndarray) -> bool:
-    """Fill one longer gap in place from the motion of the neighbours; False where they do not suffice.
+class _Carriers:
+    """What fills a marker's longer gaps: the other markers, seen from the head.
 
-    The neighbours' rigid motion gives a moving frame. In it, the marker's place is learnt from the neighbours'
-    deviations by ridge regression over frames in which all are seen; a line in time then joins the known ends.
+    All markers together give every frame a rigid pose, and so a place of each marker in the head, whatever the
+    head does. There a marker's place is learnt from its neighbours' places by ridge regression over frames in which
+    all are seen.
     """
-    sides = [frame for frame in (begin - 1, end) if 0 <= frame < len(positions)]
-    window = np.arange(max(0, begin - 1), min(len(positions), end + 1))
-    carriers = [other for other in near if known[window, other].all()][:NEIGHBOURS]
-    if len(carriers) < 3 or len(sides) < 2:
-        return False
-    together = np.flatnonzero(known[:, [*carriers, marker]].all(axis=1))
-    if len(together) > TRAINING_FRAMES:  # those around the gap, and others from the whole take
-        nearest = together[np.argsort(np.abs(together - (begin + end) / 2), kind="stable")[: TRAINING_FRAMES // 2]]
-        spaced = together[np.linspace(0, len(together) - 1, TRAINING_FRAMES // 2).astype(int)]
-        together = np.union1d(nearest, spaced)
-    together = np.union1d(together, sides)
-    frames = np.concatenate((together, np.arange(begin, end)))
-    shape = np.median(positions[np.ix_(together, carriers)], axis=0)
-    shape = positions[sides[0], carriers] if not np.isfinite(shape).all() else shape
-    reference = positions[sides[0], carriers]
-    moving = positions[np.ix_(frames, carriers)]
-    poses = rigid_transforms(reference, moving, np.ones((len(frames), len(carriers))))
-    back = inverse(poses)
-    deviations = (apply(back, moving) - reference).reshape(len(frames), -1)
-    own = apply(back[: len(together)], positions[together, marker][:, None])[:, 0]
-    train = deviations[: len(together)]
-    middle, own_middle = train.mean(axis=0), own.mean(axis=0)
-    normal = (train - middle).T @ (train - middle)
-    normal[np.diag_indices_from(normal)] += RIDGE_MM2 * len(together)
-    slopes = np.linalg.solve(normal, (train - middle).T @ (own - own_middle))
-    predicted = own_middle + (deviations - middle) @ slopes
-    at_sides = np.searchsorted(together, sides)
-    errors = own[at_sides] - predicted[at_sides]
-    part = ((np.arange(begin, end) - (begin - 1)) / (end - begin + 1))[:, None]
-    joined = predicted[len(together) :] + (1 - part) * errors[0] + part * errors[1]
-    positions[begin:end, marker] = apply(poses[len(together) :], joined[:, None])[:, 0]
-    return True
+
+    def __init__(self, positions: np.ndarray) -> None:
+        known = np.isfinite(positions[..., 0])
+        rest = positions[np.argmax(known.sum(axis=1))]
+        weights = (known & np.isfinite(rest[:, 0])).astype(float)
+        self.poses = rigid_transforms(np.nan_to_num(rest), positions, weights)
+        self.poses[weights.sum(axis=1) < 3] = np.nan
+        self.places = apply(inverse(self.poses), positions)  # (F, M, 3) in the head
+        self.known = np.isfinite(self.places[..., 0])
+        sample = self.places[:: max(1, len(positions) // 200)]
+        middle = np.nanmedian(sample, axis=0)
+        distances = np.linalg.norm(middle[:, None] - middle[None], axis=2)
+        np.fill_diagonal(distances, np.inf)
+        self.nearest = np.argsort(np.where(np.isfinite(distances), distances, np.inf), axis=1, kind="stable")
+
+    def fill(self, marker: int, begin: int, end: int) -> np.ndarray | None:
+        """(end - begin, 3) positions over a gap, or None where the neighbours do not suffice."""
+        if begin == 0 or end == len(self.known):
+            return None
+        window = slice(begin - 1, end + 1)
+        near = self.nearest[marker]
+        seen = self.known[window, :][:, near].all(axis=0)
+        carriers = near[seen & (near != marker)][:NEIGHBOURS]
+        if len(carriers) < 3 or not self.known[[begin - 1, end], marker].all():
+            return None
+        together = np.flatnonzero(self.known[:, carriers].all(axis=1) & self.known[:, marker])
+        if len(together) > TRAINING_FRAMES:
+            together = together[np.linspace(0, len(together) - 1, TRAINING_FRAMES).astype(int)]
+        train = self.places[together][:, carriers].reshape(len(together), -1)
+        own = self.places[together, marker]
+        middle, own_middle = train.mean(axis=0), own.mean(axis=0)
+        normal = (train - middle).T @ (train - middle)
+        normal[np.diag_indices_from(normal)] += RIDGE_MM2 * len(together)
+        slopes = np.linalg.solve(normal, (train - middle).T @ (own - own_middle))
+        over = self.places[window][:, carriers].reshape(end - begin + 2, -1)
+        predicted = own_middle + (over - middle) @ slopes
+        errors = self.places[[begin - 1, end], marker] - predicted[[0, -1]]
+        part = np.linspace(0.0, 1.0, end - begin + 2)[:, None]
+        joined = predicted + (1 - part) * errors[0] + part * errors[1]  # a line in time joins the known ends
+        return apply(self.poses[begin:end], joined[1:-1, None])[:, 0]
 
 
 def fill_gaps(take: Take, *, short_s: float = SHORT_S, long_s: float = LONG_S) -> Take:
@@ -128,42 +137,28 @@ def fill_gaps(take: Take, *, short_s: float = SHORT_S, long_s: float = LONG_S) -
     positions = take.positions.copy()
     missing = np.isnan(positions[..., 0])
     support = max(3, round(SUPPORT_S * take.rate) + 1)
-    counts = {"splined": 0, "from neighbours": 0, "left": 0}
+    splined, carried = 0, 0
     later: list[tuple[int, int, int]] = []
-    for marker in np.flatnonzero(missing.any(axis=0)):
-        trajectory = positions[:, marker].copy()
-        original = trajectory.copy()
-        for begin, end in runs(missing[:, marker]):
-            if (end - begin) / take.rate > short_s:
-                later.append((int(marker), int(begin), int(end)))
-                continue
-            piece = original.copy() if False else trajectory
-            if _spline(piece, int(begin), int(end), support):
-                counts["splined"] += 1
+    for marker in np.flatnonzero(missing.any(axis=0)).tolist():
+        trajectory = take.positions[:, marker]
+        for begin, end in runs(missing[:, marker]).tolist():
+            short = (end - begin) / take.rate <= short_s
+            path = _spline(trajectory, begin, end, support) if short else None
+            if path is None:
+                later.append((marker, begin, end))
             else:
-                later.append((int(marker), int(begin), int(end)))
-        positions[:, marker] = trajectory
-    known = np.isfinite(positions[..., 0])
-    distances = _rest_distances(take.positions)
-    filled = positions.copy()
-    for marker, begin, end in later:
-        near = np.argsort(distances[marker], kind="stable")
-        near = near[np.isfinite(distances[marker, near])]
-        if (end - begin) / take.rate <= long_s and _carry(filled, known, marker, begin, end, near):
-            counts["from neighbours"] += 1
-        else:
-            counts["left"] += 1
+                positions[begin:end, marker] = path
+                splined += 1
+    candidates = [gap for gap in later if (gap[2] - gap[1]) / take.rate <= long_s]
+    if candidates:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # markers that are never seen
+            carriers = _Carriers(positions)
+        for marker, begin, end in candidates:
+            path = carriers.fill(marker, begin, end)
+            if path is not None:
+                positions[begin:end, marker] = path
+                carried += 1
+    counts = {"splined": splined, "from neighbours": carried, "left": len(later) - carried}
     said = ", ".join(f"{number} {what}" for what, number in counts.items() if number)
-    return take.changed(f"fill_gaps up to {short_s:g} and {long_s:g} s: {said or 'no gaps'}", positions=filled)
-
-
-def _rest_distances(positions: np.ndarray) -> np.ndarray:
-    """(M, M) typical distances between markers, mm: the median over some frames; infinite to itself and when unknown."""
-    sample = positions[:: max(1, len(positions) // 50)]
-    apart = np.linalg.norm(sample[:, :, None] - sample[:, None], axis=3)
-    apart = np.sort(apart, axis=0)  # NaN sorts last
-    counts = np.isfinite(apart).sum(axis=0)
-    middle = np.take_along_axis(apart, np.maximum(counts - 1, 0)[None] // 2, axis=0)[0]
-    middle[counts == 0] = np.inf
-    np.fill_diagonal(middle, np.inf)
-    return middle
+    return take.changed(f"fill_gaps up to {short_s:g} and {long_s:g} s: {said or 'no gaps'}", positions=positions)

@@ -20,6 +20,7 @@ from signface.takes.take import Take
 FLATTEST = 1.0
 
 #: A head marker this far (mm) from where the others place it counts half; far ones hardly count (Cauchy weights).
+#: Noisy recordings get a greater one: twice the typical distance.
 SLIP_MM = 0.5
 
 #: Poses are interpolated over at most this long without enough head markers, in seconds.
@@ -113,15 +114,17 @@ def _head_poses(head: np.ndarray, neutral: np.ndarray) -> tuple[np.ndarray, np.n
     weights = (seen & enough[:, None]).astype(float)
     poses = rigid_transforms(neutral, head, weights)
     distances = np.linalg.norm(apply(poses, neutral) - head, axis=2)
-    busy = np.flatnonzero((np.nan_to_num(distances) > 0.25 * SLIP_MM).any(axis=1) & (seen.sum(axis=1) > 3))
+    known = np.isfinite(distances)
+    slip = max(SLIP_MM, 2 * float(np.median(distances[known]))) if known.any() else SLIP_MM
+    busy = np.flatnonzero((np.nan_to_num(distances) > 0.25 * slip).any(axis=1) & (seen.sum(axis=1) > 3))
     for _ in range(10):
         if len(busy) == 0:
             break
-        own = weights[busy] / (1 + (np.nan_to_num(distances[busy]) / SLIP_MM) ** 2)
+        own = weights[busy] / (1 + (np.nan_to_num(distances[busy]) / slip) ** 2)
         poses[busy] = rigid_transforms(neutral, head[busy], own)
         before = distances[busy]
         distances[busy] = np.linalg.norm(apply(poses[busy], neutral) - head[busy], axis=2)
-        busy = busy[(np.abs(np.nan_to_num(distances[busy] - before)) > 0.02 * SLIP_MM).any(axis=1)]
+        busy = busy[(np.abs(np.nan_to_num(distances[busy] - before)) > 0.02 * slip).any(axis=1)]
     return poses, distances
 
 
@@ -228,18 +231,17 @@ def stabilise(
             )
         shown = least_moving(take, neutral_s)
         places = take.select(shown)[frame]
-        note = f"stabilise by the least-moving markers {', '.join(shown)}"
+        note = f"stabilise by the {len(shown)} least-moving markers ({', '.join(shown[:6])}{' ...' * (len(shown) > 6)})"
         if flatness(places, np.ones((1, len(shown))))[0] < FLATTEST:
             raise SignfaceError("the markers lie on one line and do not fix a rotation", file=take.name)
     trajectories = take.select(shown)
     poses, distances = _head_poses(trajectories, places)
     bridged = _bridge(poses, int(LONGEST_BLIND_S * take.rate))
     blind = int(np.isnan(poses[:, 0, 0]).sum())
-    slipped = [
-        f"{label} ({np.nanmedian(own):.1f} mm)"
-        for label, own in zip(shown, distances.T)
-        if np.isfinite(own).any() and np.nanquantile(own, 0.75) > 4 * SLIP_MM
-    ]
+    typical = [float(np.nanmedian(own)) if np.isfinite(own).any() else 0.0 for own in distances.T]
+    farthest = [float(np.nanquantile(own, 0.9)) if np.isfinite(own).any() else 0.0 for own in distances.T]
+    limit = 4 * max(SLIP_MM, float(np.median(typical)))
+    slipped = [f"{label} ({far:.1f} mm)" for label, far in zip(shown, farthest) if far > limit]
     note += f"; slipped: {', '.join(slipped)}" if slipped else ""
     note += f"; {bridged} frames interpolated" if bridged else ""
     note += f"; {blind} frames without a pose" if blind else ""

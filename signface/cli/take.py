@@ -1,0 +1,146 @@
+"""`signface take info`: what is in a recording, before anything is done with it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import Any
+
+import numpy as np
+
+from signface.descriptors import Descriptors
+from signface.takes.take import Take
+
+EXAMPLE = "  signface take info take.c3d\n  signface take info recordings/*.c3d --json"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `signface take`."""
+    actions = parser.add_subparsers(dest="action", metavar="info", required=True)
+    info = actions.add_parser(
+        "info",
+        help="frames, rate, duration, unit, markers, gaps, head markers",
+        description="Say what a recording holds: frames, rate, duration, unit, markers, gaps, head markers.",
+        epilog=f"example:\n{EXAMPLE}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    info.add_argument("takes", nargs="+", metavar="TAKE", help="a recording: C3D, TRC, TSV, CSV, .pose")
+    info.add_argument("--unit", help="unit of length of the files (mm, cm, m, in), where they say none or a wrong one")
+    info.add_argument("--face", default="default", help="face whose layouts are tried (default: the shipped one)")
+    info.add_argument("--json", action="store_true", help="print JSON, for scripts")
+
+
+def _recognised(take: Take, face_name: str) -> dict[str, Any]:
+    """The shipped layout that fits the take's labels best, and which of its markers the take has."""
+    from signface.errors import SignfaceError
+    from signface.face.layout_files import choose_layout
+    from signface.face.reading import read_face
+    from signface.takes.labels import match_labels
+
+    face = read_face(face_name)
+    try:
+        layout = choose_layout(take.labels, face)
+    except SignfaceError as error:
+        return {"layout": None, "face_markers": 0, "head_markers": [], "missing": [], "note": error.problem}
+    found = match_labels(take.labels, layout.labels)
+    return {
+        "layout": layout.name,
+        "face_markers": sum(1 for label in layout.face_labels if label in found),
+        "head_markers": [label for label in layout.head_labels if label in found],
+        "missing": [label for label in layout.labels if label not in found],
+    }
+
+
+def describe_take(take: Take, *, face: str = "default") -> dict[str, Any]:
+    """What a take holds, as plain values: the content of `signface take info --json`."""
+    from signface.takes.gaps import gap_runs
+
+    gaps = {}
+    for label, stretches in gap_runs(take).items():
+        if len(stretches):
+            lengths = np.diff(stretches, axis=1).ravel()
+            gaps[label] = {
+                "gaps": len(lengths),
+                "missing_s": round(float(lengths.sum()) / take.rate, 6),
+                "longest_s": round(float(lengths.max()) / take.rate, 6),
+            }
+    return {
+        "name": take.name,
+        "kind": "markers",
+        "frames": take.n_frames,
+        "rate_hz": take.rate,
+        "duration_s": round(take.duration, 6),
+        "start_s": take.start,
+        "markers": list(take.labels),
+        "gaps": gaps,
+        **_recognised(take, face),
+        "history": list(take.history),
+    }
+
+
+def describe_weights(weights: Descriptors) -> dict[str, Any]:
+    """What a file of weights holds, as plain values."""
+    return {
+        "name": weights.name,
+        "kind": "weights",
+        "frames": weights.n_frames,
+        "rate_hz": weights.rate,
+        "duration_s": round(weights.duration, 6),
+        "start_s": weights.start,
+        "bases": list(weights.names),
+        "history": list(weights.history),
+    }
+
+
+def _shortened(words: list[str], most: int = 12) -> str:
+    return ", ".join(words[:most]) + (f" and {len(words) - most} more" if len(words) > most else "")
+
+
+def _report(file: str, content: dict[str, Any]) -> str:
+    """The description as lines for a person."""
+    lines = [
+        f"{file}",
+        f"  {content['frames']} frames at {content['rate_hz']:g} Hz: {content['duration_s']:.3f} s"
+        f" from {content['start_s']:.3f} s",
+    ]
+    if content["kind"] == "weights":
+        lines.append(f"  weights of {len(content['bases'])} bases: {_shortened(content['bases'])}")
+    else:
+        gaps = content["gaps"]
+        lines.append(f"  {len(content['markers'])} markers: {_shortened(content['markers'])}")
+        if not gaps:
+            lines.append("  gaps: none")
+        for label, gap in sorted(gaps.items(), key=lambda entry: -entry[1]["missing_s"])[:12]:
+            span = f"{gap['missing_s']:.3f} s in all, the longest {gap['longest_s']:.3f} s"
+            lines.append(f"  gaps of {label}: {gap['gaps']}, {span}")
+        if len(gaps) > 12:
+            lines.append(f"  and {len(gaps) - 12} more markers with gaps")
+        if content["layout"] is None:
+            lines.append(f"  layout: none of the shipped ones ({content['note']})")
+        else:
+            lines.append(f"  layout: {content['layout']}, {content['face_markers']} face markers")
+            lines.append(f"  head markers: {_shortened(content['head_markers']) or 'none'}")
+            if content["missing"]:
+                lines.append(f"  not in the take: {_shortened(content['missing'])}")
+    lines += [f"  history: {entry}" for entry in content["history"]]
+    return "\n".join(lines)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Describe each take; 0 unless one cannot be read."""
+    from signface.takes.reading import read_recording
+
+    described = []
+    for file in arguments.takes:
+        recording = read_recording(file, unit=arguments.unit)
+        if isinstance(recording, Take):
+            content = describe_take(recording, face=arguments.face)
+        else:
+            content = describe_weights(recording)
+        if arguments.json:
+            described.append({"file": str(file), **content})
+        else:
+            print(_report(str(file), content))
+    if arguments.json:
+        print(json.dumps(described, indent=2, ensure_ascii=False))
+    return 0
