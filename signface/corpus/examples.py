@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from signface.corpus.manifest import Corpus, TakeEntry
+from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.label.training import Example
 
@@ -68,15 +69,13 @@ def solve_examples(
 def solve_example(
     entry: TakeEntry, folder: Path, face: str = "default", layout: str | None = None, alpha: float | None = None
 ) -> Example:
-    """Solve one annotated take of a corpus; see `solve_examples`.
+    """Solve one annotated take of a corpus; see `solve_examples`. Weights (from a phone, or solved before) are kept.
 
     `start_s` of the row, the time of the first frame in the video, places the take on the time line of its
     annotation; `neutral_s` is on that time line too.
     """
     from signface.annotation import describe
     from signface.elan.reference import read_reference
-    from signface.face.layout_files import read_layout
-    from signface.face.reading import read_face
     from signface.takes.reading import read_recording
 
     if entry.annotation is None:
@@ -84,18 +83,24 @@ def solve_example(
     recording = read_recording(entry.path)
     if entry.start_s is not None:
         recording = recording.changed(f"start at {entry.start_s:g} s", start=entry.start_s)
-    own_face = read_face(entry.face or face)
-    own_layout = entry.layout or layout
-    try:
-        descriptors = describe(
-            recording,
-            face=own_face,
-            layout=None if own_layout is None else read_layout(own_layout, own_face),
-            neutral="auto" if entry.neutral_s is None else entry.neutral_s,
-            alpha=alpha,
-        )
-    except SignfaceError as error:
-        raise error if error.file else SignfaceError(error.problem, file=entry.path, hint=error.hint) from error
+    if isinstance(recording, Descriptors):
+        descriptors = recording
+    else:
+        from signface.face.layout_files import read_layout
+        from signface.face.reading import read_face
+
+        own_face = read_face(entry.face or face)
+        own_layout = entry.layout or layout
+        try:
+            descriptors = describe(
+                recording,
+                face=own_face,
+                layout=None if own_layout is None else read_layout(own_layout, own_face),
+                neutral="auto" if entry.neutral_s is None else entry.neutral_s,
+                alpha=alpha,
+            )
+        except SignfaceError as error:
+            raise error if error.file else SignfaceError(error.problem, file=entry.path, hint=error.hint) from error
     return Example(
         take=entry.path.relative_to(folder).with_suffix("").as_posix(),
         signer=entry.signer,

@@ -55,8 +55,9 @@ def energies(descriptors: Descriptors, *, window_s: float = 0.23, time_constant_
     """Velocity and acceleration energies of the weights of a take (thesis 4.4.2, eq. 4.4 and 4.5).
 
     The derivatives are those of a parabola fitted to the weights in a sliding window (Savitzky-Golay). The window is
-    given in seconds, so that the same motion has the same energies at any rate; near the ends of the take the
-    parabola of the last whole window is used.
+    given in seconds, so that the same motion has the same energies at any rate. The take is continued at its
+    ends by its mirror image: the parabola of half a window would fit a slope to the noise there. A movement that the
+    recording cuts off shows at the very end as an acceleration.
 
     The thesis adds `E_vel^2 + E_acc^2` although one is in 1/s and the other in 1/s^2, so that the acceleration
     drowns the velocity, and the more so the shorter the unit of time. Here the acceleration is multiplied by a time
@@ -106,7 +107,7 @@ def energies(descriptors: Descriptors, *, window_s: float = 0.23, time_constant_
     rate = descriptors.rate * factor
     window = _window_frames(window_s, rate, len(time))
     derivative = {
-        order: savgol_filter(weights, window, polyorder=2, deriv=order, delta=1 / rate, axis=0, mode="interp")
+        order: savgol_filter(weights, window, polyorder=2, deriv=order, delta=1 / rate, axis=0, mode="mirror")
         for order in (1, 2)
     }
     return Energies(

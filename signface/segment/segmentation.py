@@ -22,7 +22,7 @@ def segment(
     *,
     prominence: float = 0.25,
     least_activity: float = 0.5,
-    noise_factor: float = 6.0,
+    noise_factor: float = 8.0,
     extent: float = 0.25,
     least_stable_s: float = 0.15,
     least_transition_s: float = 0.08,
