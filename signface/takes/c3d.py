@@ -130,10 +130,13 @@ def write_c3d(take: Take, path: str | PathLike[str]) -> None:
     Raises
     ------
     SignfaceError
-        The take starts before time 0, has more frames than the format counts (65535), or the file cannot be written.
+        The ending is not .c3d, the take starts before time 0 or has more frames than the format counts (65535), or
+        the file cannot be written.
     """
     import ezc3d
 
+    if Path(path).suffix.lower() != ".c3d":
+        raise SignfaceError("the ending of a C3D file is .c3d", file=path)  # ezc3d would add it to the name
     first = round(take.start * take.rate)
     frames, markers = take.positions.shape[:2]
     if not 0 <= first < 2**31:

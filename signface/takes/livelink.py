@@ -21,6 +21,7 @@ TIMECODE = re.compile(r"^\s*(\d+):(\d+):(\d+)[:;](\d+)(\.\d+)?\s*$")
 ROTATIONS = ("HeadYaw", "HeadPitch", "HeadRoll")
 #: Rates at which phones record; a timecode cannot tell 29.97 from 30.
 USUAL_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 120.0)
+USUAL_RATE = 60.0
 
 
 def base_name(column: str) -> str:
@@ -28,25 +29,37 @@ def base_name(column: str) -> str:
     return column[:1].lower() + column[1:]
 
 
-def _times(cells: list[str], file: Path) -> tuple[np.ndarray, float]:
-    """(F,) time of each row in seconds, and the rate, from timecodes."""
+def _frames(cells: list[str], file: Path) -> tuple[np.ndarray, float]:
+    """(F,) whole number of the frame of each row, from 0 and rising, and the rate in Hz, from timecodes."""
     matches = [TIMECODE.match(cell) for cell in cells]
     wrong = next((row for row, match in enumerate(matches) if match is None), None)
     if wrong is not None:
         raise SignfaceError(f"row {wrong + 2} has no timecode ({cells[wrong][:20]!r})", file=file)
     parts = np.array([[float(part or 0) for part in match.groups()] for match in matches if match])
-    seconds = parts[:, :3] @ (3600.0, 60.0, 1.0)
-    frames = parts[:, 3] + parts[:, 4]
     if len(parts) < 2:
         raise SignfaceError("has one frame, and a rate needs two", file=file, hint="export more of the recording")
-    # Within one second the frame numbers rise to the rate less one; a short take shows it only by its last numbers.
+    seconds = parts[:, :3] @ (3600.0, 60.0, 1.0)
+    # Within a second the frame numbers rise to the rate less one. A take within one second does not show it.
     highest = parts[:, 3].max() + 1
-    turns = np.flatnonzero(np.diff(seconds) > 0)
-    if len(turns):
-        rate = min((usual for usual in USUAL_RATES if usual >= highest - 1e-9), default=highest)
+    least = highest if (np.diff(seconds) > 0).any() else max(highest, USUAL_RATE)
+    counted = min((rate for rate in USUAL_RATES if rate >= least), default=highest)
+    whole = seconds * counted + parts[:, 3]
+    if (np.diff(whole) > 0).mean() > 0.9:
+        frames, rate = whole, counted  # the parts of frames only say how far the camera runs beside the clock
     else:
-        rate = min((usual for usual in USUAL_RATES if usual >= max(highest, 60.0)), default=highest)
-    return seconds + frames / rate, rate
+        times = seconds + (parts[:, 3] + parts[:, 4]) / counted
+        step = float(np.median(np.diff(times)))
+        if step <= 0:
+            raise SignfaceError("its timecodes do not rise", file=file, hint="export it again")
+        rate = min(USUAL_RATES, key=lambda usual: abs(usual * step - 1))
+        rate = rate if abs(rate * step - 1) < 0.03 else 1 / step
+        frames = np.round((times - times[0]) * rate)
+    frames = frames - frames[0]
+    if (np.diff(frames) < 0).any():
+        raise SignfaceError("its timecodes do not rise", file=file, hint="export it again")
+    if frames[-1] > 20 * len(frames) + 1000:
+        raise SignfaceError("its timecodes leap: more frames are lost than kept", file=file, hint="record it again")
+    return frames.astype(np.int64), rate
 
 
 def _rotations(angles: np.ndarray) -> np.ndarray:
@@ -92,15 +105,10 @@ def read_livelink(path: str | PathLike[str]) -> Descriptors:
     if len(lines) < 2:
         raise SignfaceError("the file has no frames, only a header", file=file, hint="export it again")
     rows = [line.split(separator, 1) for line in lines[1:]]
-    times, rate = _times([row[0] for row in rows], file)
+    frame, rate = _frames([row[0] for row in rows], file)
     values = numbers([row[1] if len(row) > 1 else "" for row in rows], len(columns) - 1, separator, file, 2)
-    if len(values) != len(times):
+    if len(values) != len(frame):
         raise SignfaceError("a row has a timecode and nothing else", file=file, hint="the file may be cut short")
-    frame = np.round((times - times[0]) * rate).astype(np.int64)
-    if (np.diff(frame) < 0).any():
-        raise SignfaceError("its timecodes do not rise", file=file, hint="export it again")
-    if frame[-1] > 20 * len(frame) + 1000:
-        raise SignfaceError("its timecodes leap: more frames are lost than kept", file=file, hint="record it again")
     kept = np.flatnonzero(np.diff(frame, prepend=-1) > 0)
     even = np.arange(frame[-1] + 1)
     wanted = [columns.index(column) - 1 for column in (*bases, *(own for own in ROTATIONS if own in columns))]

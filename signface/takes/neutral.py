@@ -20,14 +20,18 @@ SMOOTHING_S, SHORTEST_S = 0.1, 0.2
 
 
 def _without_motion(positions: np.ndarray, head: np.ndarray) -> np.ndarray:
-    """Positions brought onto their own median shape by the head markers, frame by frame."""
-    shape = head[np.argmax(np.isfinite(head[..., 0]).sum(axis=1))]
-    for _ in range(2):
-        weights = (np.isfinite(head[..., 0]) & np.isfinite(shape[:, 0])).astype(float)
-        poses = inverse(rigid_transforms(np.nan_to_num(shape), head, weights))
+    """Positions brought onto the head markers' own median shape, frame by frame; NaN where fewer than 3 are seen."""
+
+    def onto(shape: np.ndarray, frames: np.ndarray) -> np.ndarray:
+        weights = (np.isfinite(frames[..., 0]) & np.isfinite(shape[:, 0])).astype(float)
+        poses = inverse(rigid_transforms(np.nan_to_num(shape), frames, weights))
         poses[weights.sum(axis=1) < 3] = np.nan
-        shape = np.nanmedian(apply(poses, head), axis=0)
-    return apply(poses, positions)
+        return poses
+
+    fullest = head[np.argmax(np.isfinite(head[..., 0]).sum(axis=1))]
+    sample = head[:: max(1, len(head) // 500)]
+    shape = np.nanmedian(apply(onto(fullest, sample), sample), axis=0)
+    return apply(onto(shape if np.isfinite(shape[:, 0]).sum() >= 3 else fullest, head), positions)
 
 
 def _rolling_mean(values: np.ndarray, length: int) -> np.ndarray:
