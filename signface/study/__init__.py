@@ -1,0 +1,1 @@
+"""Perceptual studies: stimuli, questionnaire, statistics (thesis chapter 6)."""
