@@ -1,0 +1,41 @@
+"""`signface synth`: make a synthetic corpus."""
+
+from __future__ import annotations
+
+import argparse
+
+EXAMPLE = """  signface synth corpora/feel
+  signface synth corpora/utterances --signers 3 --seed 7 --kinds EU"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("folder", metavar="FOLDER", help="where to write; new or empty, or made by the same command")
+    parser.add_argument("--signers", type=int, default=2, metavar="N", help="how many signers (default 2)")
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="S", help="the same seed gives the same corpus (default 0)"
+    )
+    parser.add_argument(
+        "--kinds",
+        default="IE,SE,EU",
+        metavar="KINDS",
+        help="isolated expressions (IE), sequences (SE), utterances (EU), joined by commas (default all)",
+    )
+    parser.add_argument("--mini", action="store_true", help="make the four short takes that ship in corpora/mini")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Make the corpus and say what was made."""
+    from signface.cli.progress import progress
+    from signface.corpus.synthesis import synthesise
+
+    corpus = synthesise(
+        arguments.folder,
+        signers=arguments.signers,
+        seed=arguments.seed,
+        kinds=[kind.strip() for kind in arguments.kinds.split(",") if kind.strip()],
+        mini=arguments.mini,
+        show=lambda jobs: progress(jobs, "making takes"),
+    )
+    print(f"{corpus.folder}: {len(corpus)} takes of {len(corpus.signers)} signers, described in takes.csv")
+    return 0
