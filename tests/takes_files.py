@@ -1,4 +1,4 @@
-"""Recordings made for the tests of `signface.takes`: a moving face as a take, and writers of the formats it is read from."""
+"""Recordings for the tests of `signface.takes`: a moving face as a take, and writers of the formats."""
 
 from __future__ import annotations
 
@@ -124,15 +124,25 @@ def write_pose(path: Path, landmarks: np.ndarray, names: list[str], *, size=(640
     return path
 
 
-LIVELINK_BASES = (
-    "EyeBlinkLeft EyeLookDownLeft EyeLookInLeft EyeLookOutLeft EyeLookUpLeft EyeSquintLeft EyeWideLeft EyeBlinkRight "
-    "EyeLookDownRight EyeLookInRight EyeLookOutRight EyeLookUpRight EyeSquintRight EyeWideRight JawForward JawRight "
-    "JawLeft JawOpen MouthClose MouthFunnel MouthPucker MouthRight MouthLeft MouthSmileLeft MouthSmileRight "
-    "MouthFrownLeft MouthFrownRight MouthDimpleLeft MouthDimpleRight MouthStretchLeft MouthStretchRight "
-    "MouthRollLower MouthRollUpper MouthShrugLower MouthShrugUpper MouthPressLeft MouthPressRight MouthLowerDownLeft "
-    "MouthLowerDownRight MouthUpperUpLeft MouthUpperUpRight BrowDownLeft BrowDownRight BrowInnerUp BrowOuterUpLeft "
-    "BrowOuterUpRight CheekPuff CheekSquintLeft CheekSquintRight NoseSneerLeft NoseSneerRight TongueOut"
-).split()
+def _sides(*names: str) -> list[str]:
+    return [f"{name}{side}" for name in names for side in ("Left", "Right")]
+
+
+_EYE = ("EyeBlink", "EyeLookDown", "EyeLookIn", "EyeLookOut", "EyeLookUp", "EyeSquint", "EyeWide")
+#: The columns of weights, in the application's own order.
+LIVELINK_BASES = [
+    *(f"{name}{side}" for side in ("Left", "Right") for name in _EYE),
+    *("JawForward", "JawRight", "JawLeft", "JawOpen", "MouthClose", "MouthFunnel", "MouthPucker"),
+    *("MouthRight", "MouthLeft"),
+    *_sides("MouthSmile", "MouthFrown", "MouthDimple", "MouthStretch"),
+    *("MouthRollLower", "MouthRollUpper", "MouthShrugLower", "MouthShrugUpper"),
+    *_sides("MouthPress", "MouthLowerDown", "MouthUpperUp", "BrowDown"),
+    "BrowInnerUp",
+    *_sides("BrowOuterUp"),
+    "CheekPuff",
+    *_sides("CheekSquint", "NoseSneer"),
+    "TongueOut",
+]
 LIVELINK_ANGLES = [f"{part}{turn}" for part in ("Head", "LeftEye", "RightEye") for turn in ("Yaw", "Pitch", "Roll")]
 
 

@@ -273,7 +273,7 @@ def test_depth_that_is_already_in_pixels_is_left_so(tmp_path):
 
 
 def test_landmarks_without_confidence_are_missing_and_the_person_seen_most_is_taken(tmp_path):
-    landmarks = np.stack((pictured() + (5, 5, 0), pictured()), axis=1)
+    landmarks = np.stack((pictured() + np.array([5, 5, 0]), pictured()), axis=1)
     confidence = np.ones(landmarks.shape[:3])
     confidence[1:, 0] = 0
     confidence[2, 1, 3] = 0

@@ -41,7 +41,8 @@ def _landmarks(pose: Any, file: Path) -> tuple[np.ndarray, np.ndarray, list[str]
     component = pose.header.components[names.index(FACE)]
     begin = sum(len(other.points) for other in pose.header.components[: names.index(FACE)])
     part = slice(begin, begin + len(component.points))
-    data = np.ma.getdata(pose.body.data)[:, :, part].astype(np.float64)
+    with np.errstate(invalid="ignore"):  # NaN of the signalling kind
+        data = np.ma.getdata(pose.body.data)[:, :, part].astype(np.float64)
     confidence = np.array(np.ma.getdata(pose.body.confidence)[:, :, part], dtype=np.float64)
     if data.shape[0] == 0 or data.shape[1] == 0 or data.shape[2] == 0:
         raise SignfaceError("the .pose file shows nobody", file=file, hint="extract it again")
