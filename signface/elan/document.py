@@ -29,6 +29,9 @@ SCHEMA_URL = "http://www.mpi.nl/tools/elan/EAFv3.0.xsd"
 PROPERTY_PREFIX = "signface:"
 WRITTEN_PREFIX = f"{PROPERTY_PREFIX}written:"
 
+#: Start and end in milliseconds (None where the file leaves them open) and value of an annotation.
+Row = tuple[int | None, int | None, str]
+
 
 def read_document(path: str | PathLike[str]) -> etree._ElementTree:
     """Parse an EAF (or its template, .etf) without resolving entities or touching the network.
@@ -245,12 +248,12 @@ def last_annotation_number(root: etree._Element) -> int:
     return max([*numbers, _last_number(root, "a")])
 
 
-def written_record(rows: list[tuple[int | None, int | None, str]]) -> str:
+def written_record(rows: list[Row]) -> str:
     """What is kept of a tier in the header: its annotations as compact JSON `[[start, end, value], ...]`."""
     return json.dumps([list(row) for row in rows], ensure_ascii=False, separators=(",", ":"))
 
 
-def recorded(root: etree._Element) -> dict[str, list[tuple[int | None, int | None, str]]]:
+def recorded(root: etree._Element) -> dict[str, list[Row]]:
     """Tier names and the annotations that signface wrote on them, as kept in the header.
 
     A record that cannot be read (someone edited it) is left out, so that its tier counts as the annotator's.
@@ -268,7 +271,7 @@ def recorded(root: etree._Element) -> dict[str, list[tuple[int | None, int | Non
     return found
 
 
-def tier_rows(root: etree._Element) -> dict[str, list[tuple[int | None, int | None, str]]]:
+def tier_rows(root: etree._Element) -> dict[str, list[Row]]:
     """Every tier's annotations as (start, end, value), milliseconds, in the order of time.
 
     A dependent annotation has the times of the annotation it hangs on; a time that the file leaves open is None.
@@ -296,7 +299,7 @@ def tier_rows(root: etree._Element) -> dict[str, list[tuple[int | None, int | No
             identifier = parents[identifier]
         return spans.get(identifier, (None, None))
 
-    rows: dict[str, list[tuple[int | None, int | None, str]]] = {}
+    rows: dict[str, list[Row]] = {}
     for tier in root.iterfind("TIER"):
         annotations = [
             (*span(annotation.get("ANNOTATION_ID")), annotation.findtext("ANNOTATION_VALUE") or "")
@@ -308,7 +311,11 @@ def tier_rows(root: etree._Element) -> dict[str, list[tuple[int | None, int | No
 
 
 def is_unmodified_output(root: etree._Element) -> bool:
-    """Whether signface wrote every tier of the document and nobody has changed an annotation since."""
-    written = recorded(root)
+    """Whether signface wrote the whole document and nobody has changed an annotation or a tier since."""
+    try:
+        names = json.loads(get_property(root, f"{PROPERTY_PREFIX}tiers") or "")
+    except ValueError:
+        return False
     rows = tier_rows(root)
-    return bool(written) and rows == written
+    filled = {name: held for name, held in rows.items() if held}
+    return list(rows) == names and filled == {name: held for name, held in recorded(root).items() if held}

@@ -1,21 +1,23 @@
 """Elements of an EAF document built from plain tiers.
 
 - `TimeSlots`: the slots of new annotations, put in order among those that are there.
-- `tier_elements`, `add_types`, `vocabularies_of`, `vocabulary_element`: tiers, linguistic types and vocabularies.
+- `tier_element`, `aligned_annotations`, `dependent_annotations`: tiers and what stands on them.
+- `type_element`, `vocabulary_element`: linguistic types and controlled vocabularies.
 - `add_media`, `add_link`: links to a video and to curves.
 """
 
 from __future__ import annotations
 
 import mimetypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 
+import numpy as np
 from lxml import etree
 
 from signface.elan.document import link_urls
-from signface.elan.tiers import Tier, clean_name
+from signface.elan.tiers import clean_name
 from signface.elan.vocabularies import Vocabulary
 
 LANGUAGE = {
@@ -78,83 +80,89 @@ def _not_after(slot: etree._Element, value: int) -> bool:
     return time is None or int(time) <= value
 
 
-def tier_elements(tier: Tier, slots: TimeSlots, fresh_id: Callable[[str], str]) -> list[etree._Element]:
-    """TIER elements of a tier and of those that depend on it."""
-    parent = _tier_element(tier.name, tier.type_name, tier.participant)
-    known = _entry_ids(tier.vocabulary)
-    identifiers = []
-    for start, end, value in zip(tier.start_ms, tier.end_ms, tier.values):
-        identifiers.append(fresh_id("a"))
-        annotation = etree.SubElement(etree.SubElement(parent, "ANNOTATION"), "ALIGNABLE_ANNOTATION")
-        annotation.set("ANNOTATION_ID", identifiers[-1])
-        if value in known:
-            annotation.set("CVE_REF", known[value])
-        slots.add(int(start), annotation, "TIME_SLOT_REF1")
-        slots.add(int(end), annotation, "TIME_SLOT_REF2")
-        etree.SubElement(annotation, "ANNOTATION_VALUE").text = value
-    elements = [parent]
-    for dependent in tier.dependents:
-        child = _tier_element(dependent.name, dependent.type_name, tier.participant)
-        child.set("PARENT_REF", tier.name)
-        known = _entry_ids(dependent.vocabulary)
-        for parent_id, text in zip(identifiers, dependent.values):
-            if text is None:
-                continue
-            annotation = etree.SubElement(etree.SubElement(child, "ANNOTATION"), "REF_ANNOTATION")
-            annotation.set("ANNOTATION_ID", fresh_id("a"))
-            annotation.set("ANNOTATION_REF", parent_id)
-            if text in known:
-                annotation.set("CVE_REF", known[text])
-            etree.SubElement(annotation, "ANNOTATION_VALUE").text = text
-        elements.append(child)
-    return elements
-
-
-def _tier_element(name: str, type_name: str, participant: str) -> etree._Element:
+def tier_element(name: str, type_name: str, signer: str, parent: str | None = None) -> etree._Element:
+    """An empty TIER."""
     element = etree.Element("TIER", TIER_ID=name, LINGUISTIC_TYPE_REF=type_name)
-    if participant:
-        element.set("PARTICIPANT", clean_name(participant))
+    if parent is not None:
+        element.set("PARENT_REF", parent)
+    if signer:
+        element.set("PARTICIPANT", clean_name(signer))
     element.set("ANNOTATOR", "signface")
     return element
 
 
-def _entry_ids(vocabulary: Vocabulary | None) -> dict[str, str]:
-    return {} if vocabulary is None else {entry.value: entry.identifier for entry in vocabulary.entries}
+def aligned_annotations(
+    tier: etree._Element,
+    start_ms: np.ndarray,
+    end_ms: np.ndarray,
+    values: Sequence[str | None],
+    entries: Mapping[str, str],
+    slots: TimeSlots,
+    fresh_id: Callable[[str], str],
+) -> list[str | None]:
+    """Fill a tier with time-aligned annotations; None among the values leaves one out.
+
+    Parameters
+    ----------
+    entries : mapping
+        Value and entry id (`CVE_ID`) of the tier's vocabulary.
+
+    Returns
+    -------
+    list of str or None
+        The identifier of each annotation.
+    """
+    identifiers: list[str | None] = []
+    for start, end, value in zip(start_ms, end_ms, values):
+        if value is None:
+            identifiers.append(None)
+            continue
+        identifier = fresh_id("a")
+        annotation = etree.SubElement(etree.SubElement(tier, "ANNOTATION"), "ALIGNABLE_ANNOTATION")
+        annotation.set("ANNOTATION_ID", identifier)
+        if entries.get(value):
+            annotation.set("CVE_REF", entries[value])
+        slots.add(int(start), annotation, "TIME_SLOT_REF1")
+        slots.add(int(end), annotation, "TIME_SLOT_REF2")
+        etree.SubElement(annotation, "ANNOTATION_VALUE").text = value
+        identifiers.append(identifier)
+    return identifiers
 
 
-def add_types(root: etree._Element, tiers: Sequence[Tier]) -> None:
-    """One LINGUISTIC_TYPE for each type that the tiers name."""
-    done = set()
-    for tier in tiers:
-        for name, vocabulary, dependent in [
-            (tier.type_name, tier.vocabulary, False),
-            *((child.type_name, child.vocabulary, True) for child in tier.dependents),
-        ]:
-            if name in done:
-                continue
-            done.add(name)
-            element = etree.SubElement(root, "LINGUISTIC_TYPE", LINGUISTIC_TYPE_ID=name)
-            element.set("TIME_ALIGNABLE", "false" if dependent else "true")
-            element.set("GRAPHIC_REFERENCES", "false")
-            if dependent:
-                element.set("CONSTRAINTS", "Symbolic_Association")
-            if vocabulary is not None:
-                element.set("CONTROLLED_VOCABULARY_REF", vocabulary.name)
+def dependent_annotations(
+    tier: etree._Element,
+    parents: Sequence[str | None],
+    values: Sequence[str | None],
+    entries: Mapping[str, str],
+    fresh_id: Callable[[str], str],
+) -> None:
+    """Fill a tier with annotations that hang on those of its parent; None among the values leaves one out."""
+    for parent, value in zip(parents, values):
+        if value is None or parent is None:
+            continue
+        annotation = etree.SubElement(etree.SubElement(tier, "ANNOTATION"), "REF_ANNOTATION")
+        annotation.set("ANNOTATION_ID", fresh_id("a"))
+        annotation.set("ANNOTATION_REF", parent)
+        if entries.get(value):
+            annotation.set("CVE_REF", entries[value])
+        etree.SubElement(annotation, "ANNOTATION_VALUE").text = value
 
 
-def vocabularies_of(tiers: Sequence[Tier]) -> list[Vocabulary]:
-    """The vocabularies that the tiers use, each once, in the order met."""
-    found: dict[str, Vocabulary] = {}
-    for tier in tiers:
-        for vocabulary in (tier.vocabulary, *(child.vocabulary for child in tier.dependents)):
-            if vocabulary is not None:
-                found.setdefault(vocabulary.name, vocabulary)
-    return list(found.values())
+def type_element(name: str, vocabulary: str | None, *, dependent: bool) -> etree._Element:
+    """LINGUISTIC_TYPE of an independent tier, or of one that hangs on another by symbolic association."""
+    element = etree.Element("LINGUISTIC_TYPE", LINGUISTIC_TYPE_ID=name)
+    element.set("TIME_ALIGNABLE", "false" if dependent else "true")
+    element.set("GRAPHIC_REFERENCES", "false")
+    if dependent:
+        element.set("CONSTRAINTS", "Symbolic_Association")
+    if vocabulary is not None:
+        element.set("CONTROLLED_VOCABULARY_REF", vocabulary)
+    return element
 
 
-def vocabulary_element(vocabulary: Vocabulary) -> etree._Element:
-    """CONTROLLED_VOCABULARY with multilingual entries (EAF 2.8 and later)."""
-    element = etree.Element("CONTROLLED_VOCABULARY", CV_ID=vocabulary.name)
+def vocabulary_element(vocabulary: Vocabulary, name: str) -> etree._Element:
+    """CONTROLLED_VOCABULARY of a name, with multilingual entries (EAF 2.8 and later)."""
+    element = etree.Element("CONTROLLED_VOCABULARY", CV_ID=name)
     etree.SubElement(element, "DESCRIPTION", LANG_REF=LANGUAGE["LANG_ID"]).text = vocabulary.description
     for entry in vocabulary.entries:
         item = etree.SubElement(element, "CV_ENTRY_ML", CVE_ID=entry.identifier)
@@ -166,18 +174,24 @@ def vocabulary_element(vocabulary: Vocabulary) -> etree._Element:
 
 
 def add_media(header: etree._Element, video: str | PathLike[str], file: Path) -> None:
-    """MEDIA_DESCRIPTOR with absolute and relative URL."""
+    """MEDIA_DESCRIPTOR with absolute and relative URL, unless the header has it."""
     absolute, relative = link_urls(video, file)
-    element = etree.SubElement(header, "MEDIA_DESCRIPTOR", MEDIA_URL=absolute)
+    if any(found.get("MEDIA_URL") == absolute for found in header.iterfind("MEDIA_DESCRIPTOR")):
+        return
+    element = etree.Element("MEDIA_DESCRIPTOR", MEDIA_URL=absolute)
+    header.insert(len(header.findall("MEDIA_DESCRIPTOR")), element)
     element.set("MIME_TYPE", mimetypes.guess_type(str(video))[0] or "video/mp4")
     if relative is not None:
         element.set("RELATIVE_MEDIA_URL", relative)
 
 
 def add_link(header: etree._Element, linked: str | PathLike[str], file: Path) -> None:
-    """LINKED_FILE_DESCRIPTOR: `.xml` as text/xml, anything else as text/plain."""
+    """LINKED_FILE_DESCRIPTOR: `.xml` as text/xml, anything else as text/plain; unless the header has it."""
     absolute, relative = link_urls(linked, file)
-    element = etree.SubElement(header, "LINKED_FILE_DESCRIPTOR", LINK_URL=absolute)
+    if any(found.get("LINK_URL") == absolute for found in header.iterfind("LINKED_FILE_DESCRIPTOR")):
+        return
+    element = etree.Element("LINKED_FILE_DESCRIPTOR", LINK_URL=absolute)
+    header.insert(len(header.findall("MEDIA_DESCRIPTOR")) + len(header.findall("LINKED_FILE_DESCRIPTOR")), element)
     element.set("MIME_TYPE", "text/xml" if str(linked).lower().endswith(".xml") else "text/plain")
     if relative is not None:
         element.set("RELATIVE_LINK_URL", relative)

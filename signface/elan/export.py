@@ -1,10 +1,17 @@
-"""`write_eaf`: labelled segments as an EAF 3.0 file of its own."""
+"""Labelled segments as EAF 3.0.
+
+- `write_eaf`: a file of its own, from nothing or from a lab's template.
+- `write_into`: into a file that is there, touching nothing but our own tiers.
+- `check_writable`: whether a file may be overwritten.
+"""
 
 from __future__ import annotations
 
 import datetime
+import json
 import uuid
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from collections.abc import Mapping as MappingABC
 from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
@@ -14,33 +21,22 @@ from lxml import etree
 from signface.elan.document import (
     PROPERTY_PREFIX,
     SCHEMA_URL,
-    WRITTEN_PREFIX,
     XSI,
     back_up,
-    fresh_ids,
     is_unmodified_output,
     iso_date,
-    last_annotation_number,
     read_document,
     recorded,
     set_property,
     tier_rows,
     write_document,
-    written_record,
 )
-from signface.elan.elements import (
-    CONSTRAINTS,
-    LANGUAGE,
-    TimeSlots,
-    add_link,
-    add_media,
-    add_types,
-    tier_elements,
-    vocabularies_of,
-    vocabulary_element,
-)
+from signface.elan.elements import CONSTRAINTS, add_link, add_media
+from signface.elan.mapping import Mapping
+from signface.elan.merging import put_tiers
 from signface.elan.preferences import write_preferences
 from signface.elan.tiers import Tier, affect_tier, xml_text
+from signface.elan.upgrade import upgrade
 from signface.elan.vocabularies import AFFECT, Vocabulary
 from signface.errors import SignfaceError
 from signface.segment.segments import Segments
@@ -52,10 +48,12 @@ def write_eaf(
     *,
     signer: str = "",
     video: str | PathLike[str] | None = None,
-    properties: Mapping[str, str] | None = None,
+    properties: MappingABC[str, str] | None = None,
     vocabulary: Vocabulary = AFFECT,
     tiers: Sequence[Tier] = (),
     linked_files: Sequence[str | PathLike[str]] = (),
+    template: str | PathLike[str] | None = None,
+    mapping: Mapping | None = None,
     date: datetime.datetime | str | None = None,
     author: str = "signface",
     replace: bool = False,
@@ -81,9 +79,14 @@ def write_eaf(
     vocabulary : Vocabulary
         The labels allowed on the affect tier.
     tiers : sequence of Tier
-        Further tiers (`signface.label.channels`).
+        Further tiers (`tiers.doubtful_tier`, `signface.label.channels`).
     linked_files : sequence of path
         Curves and their description, linked as secondary files (`.csv` as text/plain, `.xml` as text/xml).
+    template : path, optional
+        A lab's `.etf` or `.eaf`, whose tiers, types, vocabularies, languages and participants are taken over; of an
+        `.eaf`, annotations and media are left behind.
+    mapping : mapping of channel to ChannelRule, optional
+        Which channel goes to which tier of the template (`mapping.read_mapping`).
     date : datetime or str, optional
         The document's date (ISO 8601); now when not given. With a date, the same input gives the same bytes.
     author : str
@@ -94,22 +97,83 @@ def write_eaf(
     Raises
     ------
     SignfaceError
-        The segments carry no label or one outside the vocabulary; the file exists and someone has worked in it; it
-        cannot be written.
+        The segments carry no label or one outside the vocabulary; the template or the mapping does not fit; the file
+        exists and someone has worked in it; it cannot be written.
     """
     file = Path(path)
     check_writable(file, replace=replace)
     all_tiers = (affect_tier(segments, signer, vocabulary=vocabulary), *tiers)
-    details = {"take": segments.name, **(properties or {})}
-    if segments.history and "history" not in details:
-        details["history"] = "; ".join(segments.history)
-    root = build_document(
-        all_tiers, file, video=video, properties=details, linked_files=linked_files, date=date, author=author
-    )
-    _keep_previous(file, root)
+    root = _new_document() if template is None else _read_template(template)
+    root.set("AUTHOR", xml_text(author))
+    root.set("DATE", iso_date(date))
+    put_tiers(root, all_tiers, mapping=mapping, file=file if template is None else Path(template))
+    _fill_header(root, file, segments, video, properties, linked_files)
+    rows = tier_rows(root)
+    content = json.dumps([root.get("DATE"), segments.name, rows], ensure_ascii=False)
+    set_property(root, "URN", f"urn:nl-mpi-tools-elan-eaf:{uuid.uuid5(uuid.NAMESPACE_URL, content)}")
+    set_property(root, f"{PROPERTY_PREFIX}tiers", json.dumps(list(rows), ensure_ascii=False))
+    if file.is_file() and not (_untouched(file) and recorded(read_document(file).getroot()) == recorded(root)):
+        back_up(file)
     write_document(etree.ElementTree(root), file)
-    curves = next((linked for linked in linked_files if str(linked).endswith(".csv")), None)
-    write_preferences(file.with_suffix(".pfsx"), all_tiers, curves=curves)
+    _write_preferences(file, all_tiers, linked_files)
+
+
+def write_into(
+    eaf: str | PathLike[str],
+    segments: Segments,
+    *,
+    signer: str = "",
+    video: str | PathLike[str] | None = None,
+    properties: MappingABC[str, str] | None = None,
+    vocabulary: Vocabulary = AFFECT,
+    tiers: Sequence[Tier] = (),
+    linked_files: Sequence[str | PathLike[str]] = (),
+    mapping: Mapping | None = None,
+    date: datetime.datetime | str | None = None,
+    replace: bool = False,
+) -> bool:
+    """Write labelled segments into an EAF that is there.
+
+    Only our own tiers are added or replaced: every other tier, annotation, identifier, time slot, comment, property,
+    licence, link, locale, lexicon and external reference stays as it is. Files of EAF 2.5 to 2.8 become 3.0. The
+    previous file is kept as a backup; when nothing would change, nothing is written.
+
+    Parameters
+    ----------
+    eaf : path
+        Changed in place.
+    segments, signer, video, properties, vocabulary, tiers, linked_files, mapping, date :
+        As in `write_eaf`.
+    replace : bool
+        Overwrite what an annotator corrected in our tiers.
+
+    Returns
+    -------
+    bool
+        Whether the file was changed.
+
+    Raises
+    ------
+    SignfaceError
+        As `write_eaf`; or the file is broken (`checking.check_document`), a tier of ours was corrected, or
+        annotations of others would be lost. The file is then as it was.
+    """
+    from signface.elan.checking import check_document
+
+    file = Path(eaf)
+    tree = read_document(file)
+    root = tree.getroot()
+    check_document(root, file)
+    all_tiers = (affect_tier(segments, signer, vocabulary=vocabulary), *tiers)
+    upgrade(root)
+    if not put_tiers(root, all_tiers, mapping=mapping, replace=replace, file=file):
+        return False
+    _fill_header(root, file, segments, video, properties, linked_files)
+    root.set("DATE", iso_date(date))
+    back_up(file)
+    write_document(tree, file)
+    _write_preferences(file, all_tiers, linked_files)
+    return True
 
 
 def check_writable(path: str | PathLike[str], *, replace: bool = False) -> None:
@@ -137,63 +201,61 @@ def _untouched(file: Path) -> bool:
         return False  # not an EAF of ours, whatever it is
 
 
-def _keep_previous(file: Path, root: etree._Element) -> None:
-    """Keep the file that is about to be overwritten, unless it is our own output with the same annotations."""
-    if file.is_file() and not (_untouched(file) and recorded(read_document(file).getroot()) == tier_rows(root)):
-        back_up(file)
-
-
-def build_document(
-    tiers: Sequence[Tier],
-    file: Path,
-    *,
-    video: str | PathLike[str] | None,
-    properties: Mapping[str, str],
-    linked_files: Sequence[str | PathLike[str]],
-    date: datetime.datetime | str | None,
-    author: str,
-) -> etree._Element:
-    """The document's root element, complete and valid; nothing is written."""
+def _new_document() -> etree._Element:
+    """The root of a document without tiers."""
     root = etree.Element("ANNOTATION_DOCUMENT", nsmap={"xsi": XSI})
-    root.set("AUTHOR", author)
-    root.set("DATE", iso_date(date))
     root.set("FORMAT", "3.0")
     root.set("VERSION", "3.0")
     root.set(f"{{{XSI}}}noNamespaceSchemaLocation", SCHEMA_URL)
+    etree.SubElement(root, "HEADER", MEDIA_FILE="", TIME_UNITS="milliseconds")
+    etree.SubElement(root, "TIME_ORDER")
+    etree.SubElement(root, "LOCALE", COUNTRY_CODE="US", LANGUAGE_CODE="en")
+    for stereotype, description in CONSTRAINTS.items():
+        etree.SubElement(root, "CONSTRAINT", STEREOTYPE=stereotype, DESCRIPTION=description)
+    return root
 
-    header = etree.SubElement(root, "HEADER", MEDIA_FILE="", TIME_UNITS="milliseconds")
+
+def _read_template(template: str | PathLike[str]) -> etree._Element:
+    """The root of a template as EAF 3.0, without annotations, time slots, links between annotations and media."""
+    from signface.elan.checking import check_document
+
+    root = read_document(template).getroot()
+    check_document(root, Path(template))
+    upgrade(root)
+    for annotation in root.findall("TIER/ANNOTATION"):
+        annotation.getparent().remove(annotation)
+    for element in [
+        *root.findall("REF_LINK_SET"),
+        *root.findall("TIME_ORDER/*"),
+        *root.findall("HEADER/MEDIA_DESCRIPTOR"),
+        *root.findall("HEADER/LINKED_FILE_DESCRIPTOR"),
+        *root.findall("HEADER/PROPERTY"),
+    ]:
+        element.getparent().remove(element)
+    return root
+
+
+def _fill_header(
+    root: etree._Element,
+    file: Path,
+    segments: Segments,
+    video: str | PathLike[str] | None,
+    properties: MappingABC[str, str] | None,
+    linked_files: Iterable[str | PathLike[str]],
+) -> None:
+    """Media, links, and the properties that say what wrote the tiers and from what."""
+    header = root.find("HEADER")
     if video is not None:
         add_media(header, video, file)
     for linked in linked_files:
         add_link(header, linked, file)
-
-    fresh_id = fresh_ids(root)
-    slots = TimeSlots(fresh_id)
-    order = etree.SubElement(root, "TIME_ORDER")
-    for tier in tiers:
-        root.extend(tier_elements(tier, slots, fresh_id))
-    slots.place(order)
-    add_types(root, tiers)
-    etree.SubElement(root, "LOCALE", COUNTRY_CODE="US", LANGUAGE_CODE="en")
-    etree.SubElement(root, "LANGUAGE", LANGUAGE)
-    for stereotype, description in CONSTRAINTS.items():
-        etree.SubElement(root, "CONSTRAINT", STEREOTYPE=stereotype, DESCRIPTION=description)
-    for vocabulary in vocabularies_of(tiers):
-        root.append(vocabulary_element(vocabulary))
-
-    records = tier_rows(root)
-    content = "\n".join([root.get("DATE") or "", *(f"{name} {written_record(rows)}" for name, rows in records.items())])
-    set_property(root, "URN", f"urn:nl-mpi-tools-elan-eaf:{uuid.uuid5(uuid.NAMESPACE_URL, content)}")
-    set_property(root, "lastUsedAnnotationId", str(last_annotation_number(root)))
-    add_own_properties(root, properties)
-    for name, rows in records.items():
-        set_property(root, WRITTEN_PREFIX + name, written_record(rows))
-    return root
-
-
-def add_own_properties(root: etree._Element, properties: Mapping[str, str]) -> None:
-    """Header properties that say what wrote the file and from what."""
-    set_property(root, f"{PROPERTY_PREFIX}tool", "signface")
-    set_property(root, f"{PROPERTY_PREFIX}version", version("signface"))
-    for name, value in properties.items():
+    details = {"tool": "signface", "version": version("signface"), "take": segments.name, **(properties or {})}
+    if segments.history:
+        details.setdefault("history", "; ".join(segments.history))
+    for name, value in details.items():
         set_property(root, PROPERTY_PREFIX + name, xml_text(str(value)))
+
+
+def _write_preferences(file: Path, tiers: Sequence[Tier], linked_files: Iterable[str | PathLike[str]]) -> None:
+    curves = next((linked for linked in linked_files if str(linked).endswith(".csv")), None)
+    write_preferences(file.with_suffix(".pfsx"), tiers, curves=curves)

@@ -3,6 +3,7 @@
 - `Tier`: a time-aligned tier and the tiers that depend on it by symbolic association.
 - `milliseconds`: seconds to the whole milliseconds of EAF, without gaps, overlaps or empty annotations appearing.
 - `affect_tier`: the tiers `affect@SIGNER`, `affect-confidence@SIGNER` and `intensity@SIGNER` from labelled segments.
+- `doubtful_tier`: the segments whose confidence is low, on a tier of their own.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import re
 from dataclasses import dataclass, field
 
 import numpy as np
+import pandas as pd
 
 from signface.elan.vocabularies import AFFECT, INTENSITY, Vocabulary
 from signface.errors import SignfaceError
@@ -19,30 +21,33 @@ from signface.segment.segments import Segments
 
 @dataclass(frozen=True)
 class Tier:
-    """A time-aligned tier.
+    """A time-aligned tier of one channel of one signer.
 
     Parameters
     ----------
-    name : str
-        The `TIER_ID`.
+    channel : str
+        What is annotated: `affect`, `brows`, ... It names the linguistic type as well.
+    signer : str
+        The participant; empty for a tier without `@`.
     start_ms, end_ms : (n,) int64 array
         Times of the annotations in milliseconds, in order, without overlap.
     values : (n,) tuple of str
-    type_name : str
-        The linguistic type.
     vocabulary : Vocabulary, optional
         The closed vocabulary of the values.
-    participant : str
     dependents : tuple of DependentTier
+
+    Raises
+    ------
+    SignfaceError
+        Annotations overlap, are empty, out of order or before time 0, or a value is not in the vocabulary.
     """
 
-    name: str
+    channel: str
+    signer: str
     start_ms: np.ndarray
     end_ms: np.ndarray
     values: tuple[str, ...]
-    type_name: str
     vocabulary: Vocabulary | None = None
-    participant: str = ""
     dependents: tuple[DependentTier, ...] = field(default=())
 
     def __post_init__(self) -> None:
@@ -55,6 +60,11 @@ class Tier:
         if self.vocabulary is not None:
             self.vocabulary.check(list(self.values), f"tier {self.name}")
 
+    @property
+    def name(self) -> str:
+        """The `TIER_ID`: `CHANNEL@SIGNER`."""
+        return tier_name(self.channel, self.signer)
+
 
 @dataclass(frozen=True)
 class DependentTier:
@@ -62,16 +72,14 @@ class DependentTier:
 
     Parameters
     ----------
-    name : str
+    channel : str
     values : (n,) tuple of str or None
         One for each annotation of the parent; None where there is none.
-    type_name : str
     vocabulary : Vocabulary, optional
     """
 
-    name: str
+    channel: str
     values: tuple[str | None, ...]
-    type_name: str
     vocabulary: Vocabulary | None = None
 
 
@@ -120,30 +128,53 @@ def affect_tier(segments: Segments, signer: str = "", *, vocabulary: Vocabulary 
     SignfaceError
         The segments carry no label, or one outside the vocabulary.
     """
-    if not segments.labelled:
-        raise SignfaceError(f"{segments.name}: the segments carry no labels", hint="label them first")
-    table = segments.table[segments.table["end_s"] > 0.0005]
-    start_ms, end_ms = milliseconds(table["start_s"].clip(lower=0).to_numpy(), table["end_s"].to_numpy())
+    table, start_ms, end_ms = _after_time_0(segments)
     dependents = []
     if "confidence" in table.columns:
         numbers = table["confidence"].to_numpy(float)
         shown = tuple(f"{number:.2f}" if np.isfinite(number) else None for number in numbers)
-        dependents.append(DependentTier(tier_name("affect-confidence", signer), shown, "affect-confidence"))
+        dependents.append(DependentTier("affect-confidence", shown))
     if "intensity" in table.columns:
         numbers = table["intensity"].to_numpy(float)
-        shown = tuple(str(int(number)) if np.isfinite(number) else None for number in numbers)
+        shown = tuple(f"{number:g}" if np.isfinite(number) else None for number in numbers)
         INTENSITY.check([value for value in shown if value is not None], f"{segments.name}: intensity")
-        dependents.append(DependentTier(tier_name("intensity", signer), shown, "intensity", INTENSITY))
-    return Tier(
-        tier_name("affect", signer),
-        start_ms,
-        end_ms,
-        tuple(str(label) for label in table["label"]),
-        "affect",
-        vocabulary,
-        participant=signer,
-        dependents=tuple(dependents),
-    )
+        dependents.append(DependentTier("intensity", shown, INTENSITY))
+    labels = tuple(str(label) for label in table["label"])
+    return Tier("affect", signer, start_ms, end_ms, labels, vocabulary, tuple(dependents))
+
+
+def doubtful_tier(segments: Segments, signer: str = "", *, below: float = 0.5, vocabulary: Vocabulary = AFFECT) -> Tier:
+    """The tier `affect-doubtful@SIGNER`: the segments whose confidence is low, for an annotator to go through first.
+
+    Parameters
+    ----------
+    segments : Segments
+        With `label` and `confidence`.
+    signer : str
+    below : float
+        Segments with a confidence under it are taken.
+    vocabulary : Vocabulary
+
+    Raises
+    ------
+    SignfaceError
+        As `affect_tier`, or the segments carry no confidence.
+    """
+    table, start_ms, end_ms = _after_time_0(segments)
+    if "confidence" not in table.columns:
+        raise SignfaceError(f"{segments.name}: the segments carry no confidence", hint="label them first")
+    low = table["confidence"].to_numpy(float) < below
+    labels = tuple(str(label) for label in table["label"][low])
+    return Tier("affect-doubtful", signer, start_ms[low], end_ms[low], labels, vocabulary)
+
+
+def _after_time_0(segments: Segments) -> tuple[pd.DataFrame, np.ndarray, np.ndarray]:
+    """The labelled rows that lie after time 0, and their times in milliseconds."""
+    if not segments.labelled:
+        raise SignfaceError(f"{segments.name}: the segments carry no labels", hint="label them first")
+    table = segments.table[segments.table["end_s"] > 0.0005]
+    start_ms, end_ms = milliseconds(table["start_s"].clip(lower=0).to_numpy(float), table["end_s"].to_numpy(float))
+    return table, start_ms, end_ms
 
 
 def tier_name(channel: str, signer: str) -> str:

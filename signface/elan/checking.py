@@ -1,0 +1,165 @@
+"""What is wrong with an EAF: `find_problems` lists it, `check_document` refuses the document.
+
+The schema tells whether a document is well formed as an EAF; these are the faults that it cannot see or that are worth
+saying in plain words.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+from lxml import etree
+
+from signface.errors import SignfaceError
+
+#: Attribute that identifies an element, for those whose identifiers must be unique among their like.
+NAMES = {
+    "TIER": "TIER_ID",
+    "LINGUISTIC_TYPE": "LINGUISTIC_TYPE_ID",
+    "CONTROLLED_VOCABULARY": "CV_ID",
+    "LANGUAGE": "LANG_ID",
+    "EXTERNAL_REF": "EXT_REF_ID",
+    "LEXICON_REF": "LEX_REF_ID",
+    "LOCALE": "LANGUAGE_CODE",
+    "CONSTRAINT": "STEREOTYPE",
+}
+
+
+def check_document(root: etree._Element, file: Path) -> None:
+    """Refuse a document with problems.
+
+    Raises
+    ------
+    SignfaceError
+        The first problem and the number of others, in one line.
+    """
+    problems = list(find_problems(root))
+    if problems:
+        more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+        raise SignfaceError(
+            f"{problems[0]}{more}", file=file, hint="see them all with signface elan check, and mend them in ELAN"
+        )
+
+
+def find_problems(root: etree._Element, *, media_ms: float | None = None) -> Iterator[str]:
+    """Problems of a document, each as a short clause.
+
+    Duplicate identifiers, dangling references, rings of dependent annotations, annotations that do not end after
+    they start or that overlap on their tier.
+
+    Parameters
+    ----------
+    root : element
+        What `document.read_document` returns.
+    media_ms : float, optional
+        Length of the media in milliseconds; annotations that end after it are named.
+    """
+    yield from _duplicates(root)
+    yield from _dangling_names(root)
+    yield from _annotations(root, media_ms)
+
+
+def _duplicates(root: etree._Element) -> Iterator[str]:
+    for tag, attribute in NAMES.items():
+        for name, count in Counter(element.get(attribute) for element in root.iterfind(tag)).items():
+            if name is None:
+                yield f"a {tag} has no {attribute}"
+            elif count > 1:
+                yield f"{count} elements {tag} have the name {name}"
+    identifiers: Counter[str | None] = Counter()
+    for slot in root.iterfind("TIME_ORDER/TIME_SLOT"):
+        identifiers[slot.get("TIME_SLOT_ID")] += 1
+    for annotation in root.iterfind("TIER/ANNOTATION/*"):
+        identifiers[annotation.get("ANNOTATION_ID")] += 1
+    for name, count in identifiers.items():
+        if name is None:
+            yield "an annotation or time slot has no identifier"
+        elif count > 1:
+            yield f"the identifier {name} is used {count} times"
+
+
+def _dangling_names(root: etree._Element) -> Iterator[str]:
+    def named(tag: str) -> set[str | None]:
+        return {element.get(NAMES[tag]) for element in root.iterfind(tag)}
+
+    types, vocabularies, tiers, languages = (
+        named(tag) for tag in ("LINGUISTIC_TYPE", "CONTROLLED_VOCABULARY", "TIER", "LANGUAGE")
+    )
+    for tier in root.iterfind("TIER"):
+        name = tier.get("TIER_ID")
+        if tier.get("LINGUISTIC_TYPE_REF") not in types:
+            yield f"the tier {name} has the type {tier.get('LINGUISTIC_TYPE_REF')}, which is not there"
+        parent = tier.get("PARENT_REF")
+        if parent is not None and parent not in tiers:
+            yield f"the tier {name} depends on the tier {parent}, which is not there"
+    parents = {tier.get("TIER_ID"): tier.get("PARENT_REF") for tier in root.iterfind("TIER")}
+    for name in parents:
+        seen, above = {name}, parents[name]
+        while above is not None and above not in seen:
+            seen.add(above)
+            above = parents.get(above)
+        if above == name:
+            yield f"the tier {name} depends on itself"
+    for kind in root.iterfind("LINGUISTIC_TYPE"):
+        vocabulary = kind.get("CONTROLLED_VOCABULARY_REF")
+        if vocabulary is not None and vocabulary not in vocabularies:
+            yield f"the type {kind.get('LINGUISTIC_TYPE_ID')} has the vocabulary {vocabulary}, which is not there"
+    for value in root.iterfind("CONTROLLED_VOCABULARY/CV_ENTRY_ML/CVE_VALUE"):
+        if value.get("LANG_REF") not in languages:
+            yield f"the vocabulary value {value.text} is in the language {value.get('LANG_REF')}, which is not there"
+
+
+def _annotations(root: etree._Element, media_ms: float | None) -> Iterator[str]:
+    slots = {slot.get("TIME_SLOT_ID"): slot.get("TIME_VALUE") for slot in root.iterfind("TIME_ORDER/TIME_SLOT")}
+    parents: dict[str | None, str | None] = {}
+    known = set()
+    for annotation in root.iterfind("TIER/ANNOTATION/*"):
+        known.add(annotation.get("ANNOTATION_ID"))
+        if annotation.tag == "REF_ANNOTATION":
+            parents[annotation.get("ANNOTATION_ID")] = annotation.get("ANNOTATION_REF")
+    for tier in root.iterfind("TIER"):
+        name = tier.get("TIER_ID")
+        spans = []
+        for annotation in tier.iterfind("ANNOTATION/*"):
+            identifier = annotation.get("ANNOTATION_ID")
+            if annotation.tag == "REF_ANNOTATION":
+                for attribute in ("ANNOTATION_REF", "PREVIOUS_ANNOTATION"):
+                    target = annotation.get(attribute)
+                    if target not in known and (target is not None or attribute == "ANNOTATION_REF"):
+                        yield f"the annotation {identifier} refers to {target}, which is not there"
+                if _in_a_ring(identifier, parents):
+                    yield f"the annotation {identifier} depends on itself"
+                continue
+            ends = [annotation.get("TIME_SLOT_REF1"), annotation.get("TIME_SLOT_REF2")]
+            missing = [slot for slot in ends if slot not in slots]
+            if missing:
+                yield f"the annotation {identifier} refers to the time slot {missing[0]}, which is not there"
+                continue
+            start, end = (slots[slot] for slot in ends)
+            if start is None or end is None:
+                continue
+            if int(start) >= int(end):
+                yield f"the annotation {identifier} on tier {name} does not end after it starts ({start} ms)"
+                continue
+            if media_ms is not None and int(end) > media_ms:
+                yield f"the annotation {identifier} on tier {name} ends at {end} ms, the media at {media_ms:.0f} ms"
+            spans.append((int(start), int(end), identifier))
+        spans.sort()
+        for (_, end, first), (start, _, second) in pairwise(spans):
+            if start < end:
+                yield f"the annotations {first} and {second} on tier {name} overlap at {start} ms"
+
+
+def _in_a_ring(identifier: str | None, parents: dict[str | None, str | None]) -> bool:
+    """Whether following the parents of an annotation leads back to it."""
+    seen = set()
+    current = parents.get(identifier)
+    while current in parents and current not in seen:
+        if current == identifier:
+            return True
+        seen.add(current)
+        current = parents[current]
+    return current == identifier

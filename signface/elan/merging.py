@@ -1,0 +1,329 @@
+"""`put_tiers`: our tiers into a document that somebody else made, leaving everything else as it is.
+
+First a plan is made and every reason to refuse is found; only then is the tree changed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from lxml import etree
+
+from signface.elan.document import (
+    PROPERTY_PREFIX,
+    WRITTEN_PREFIX,
+    Row,
+    fresh_ids,
+    last_annotation_number,
+    recorded,
+    set_property,
+    tier_rows,
+    written_record,
+)
+from signface.elan.elements import (
+    CONSTRAINTS,
+    LANGUAGE,
+    TimeSlots,
+    aligned_annotations,
+    dependent_annotations,
+    tier_element,
+    type_element,
+    vocabulary_element,
+)
+from signface.elan.mapping import ChannelRule, Mapping, closed_entries, stereotype
+from signface.elan.tiers import Tier, clean_name, tier_name
+from signface.elan.upgrade import insert_in_order
+from signface.elan.vocabularies import Vocabulary
+from signface.errors import SignfaceError
+
+CHANNEL_PREFIX = f"{PROPERTY_PREFIX}channel:"
+
+
+@dataclass
+class _Placement:
+    """Where one channel goes: the tier (there or to be made) and the values as the lab writes them."""
+
+    channel: str
+    tier_id: str
+    element: etree._Element | None
+    aligned: bool
+    values: list[str | None]
+    rows: list[Row]
+    entries: dict[str, str]
+    vocabulary: Vocabulary | None
+    labels: dict[str, str]
+
+
+def put_tiers(
+    root: etree._Element, tiers: Sequence[Tier], *, mapping: Mapping | None = None, replace: bool = False, file: Path
+) -> bool:
+    """Add our tiers to a document, or bring those that are there up to date.
+
+    A tier whose annotations are already those to be written is not touched, identifiers included. A tier that holds
+    annotations is overwritten only where signface wrote them and nobody changed them since, or with `replace`.
+
+    Parameters
+    ----------
+    root : element
+        An EAF 3.0 document (`upgrade.upgrade`); changed in place.
+    tiers : sequence of Tier
+    mapping : mapping of channel to ChannelRule, optional
+    replace : bool
+        Overwrite what an annotator corrected in our tiers.
+    file : Path
+        Named in errors.
+
+    Returns
+    -------
+    bool
+        Whether anything changed.
+
+    Raises
+    ------
+    SignfaceError
+        Before anything is changed: the mapping names a tier that is missing or of the wrong kind, a label is not in
+        a closed vocabulary, annotations would be lost that are not ours.
+    """
+    before = tier_rows(root)
+    written = recorded(root)
+    groups: list[tuple[Tier, list[_Placement]]] = []
+    for tier in tiers:
+        placements = _plan(root, tier, mapping or {}, file)
+        if placements:
+            groups.append((tier, placements))
+    names = [placement.tier_id for _, group in groups for placement in group]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise SignfaceError(f"two channels are mapped to the tier {twice[0]}", file=file)
+    changed = []
+    for tier, group in groups:
+        if all(placement.element is not None and before[placement.tier_id] == placement.rows for placement in group):
+            continue
+        for placement in group:
+            current = before.get(placement.tier_id, [])
+            if current and not replace and written.get(placement.tier_id) != current:
+                raise SignfaceError(
+                    f"the tier {placement.tier_id} holds annotations that signface did not write or that were "
+                    "corrected since",
+                    file=file,
+                    hint="keep them and leave the tier out of the mapping, or overwrite them with --replace",
+                )
+        _refuse_losses(root, group, file)
+        changed.append((tier, group))
+    if not changed:
+        return False
+    fresh_id = fresh_ids(root)
+    slots = TimeSlots(fresh_id)
+    for _, group in changed:
+        for placement in group:
+            if placement.element is not None:
+                _empty(root, placement.element)
+    for tier, group in changed:
+        _write(root, tier, group, slots, fresh_id)
+    order = root.find("TIME_ORDER")
+    slots.place(order)
+    set_property(root, "lastUsedAnnotationId", str(last_annotation_number(root)))
+    after = tier_rows(root)
+    for _, group in changed:
+        for placement in group:
+            set_property(root, WRITTEN_PREFIX + placement.tier_id, written_record(after[placement.tier_id]))
+            if placement.tier_id.partition("@")[0] != placement.channel or placement.labels:
+                meaning = {"channel": placement.channel, "labels": placement.labels}
+                set_property(root, CHANNEL_PREFIX + placement.tier_id, json.dumps(meaning, ensure_ascii=False))
+    return True
+
+
+def _plan(root: etree._Element, tier: Tier, mapping: Mapping, file: Path) -> list[_Placement]:
+    """Placements of a tier and its dependents, the aligned one first; empty when the mapping leaves it out."""
+    parent = _place(root, tier.channel, tier, tier.values, tier.vocabulary, None, mapping, file)
+    if parent is None:
+        return []
+    group = [parent]
+    for child in tier.dependents:
+        placement = _place(root, child.channel, tier, child.values, child.vocabulary, parent, mapping, file)
+        if placement is not None:
+            group.append(placement)
+    return group
+
+
+def _place(
+    root: etree._Element,
+    channel: str,
+    tier: Tier,
+    labels: Sequence[str | None],
+    vocabulary: Vocabulary | None,
+    parent: _Placement | None,
+    mapping: Mapping,
+    file: Path,
+) -> _Placement | None:
+    rule = mapping.get(channel) or ChannelRule(tier_name(channel, tier.signer))
+    if not rule.tier:
+        return None
+    tier_id = rule.tier.replace("{signer}", clean_name(tier.signer))
+    element = next((found for found in root.iterfind("TIER") if found.get("TIER_ID") == tier_id), None)
+    if element is None and channel in mapping:
+        names = ", ".join(found.get("TIER_ID") or "" for found in root.iterfind("TIER"))
+        raise SignfaceError(
+            f"has no tier {tier_id}, to which the mapping sends {channel}", file=file, hint=f"its tiers are {names}"
+        )
+    aligned = parent is None
+    if element is not None:
+        kind = stereotype(root, element)
+        if parent is not None and kind is None:
+            aligned = True  # the lab keeps this channel on a tier of its own times
+        elif (
+            (kind is not None)
+            if parent is None
+            else (kind != "Symbolic_Association" or element.get("PARENT_REF") != parent.tier_id)
+        ):
+            raise SignfaceError(
+                f"the tier {tier_id} depends on {element.get('PARENT_REF')} ({kind}), which {channel} cannot",
+                file=file,
+                hint="map it to a tier without a parent"
+                + ("" if parent is None else f", or one associated with {parent.tier_id}"),
+            )
+    values = [None if label is None else rule.value(label) for label in labels]
+    if parent is not None:  # an annotation that is left out takes what hangs on it along
+        values = [None if above is None else value for above, value in zip(parent.values, values)]
+    entries = None if element is None else closed_entries(root, element)
+    if entries is not None:
+        outside = sorted({value for value in values if value is not None and value not in entries})
+        if outside:
+            raise SignfaceError(
+                f"{outside[0]!r} ({channel}) is not in the closed vocabulary of the tier {tier_id}",
+                file=file,
+                hint=f"it holds {', '.join(list(entries)[:12])}; say in the mapping what becomes of it",
+            )
+    rows: list[Row] = [
+        (int(start), int(end), value)
+        for start, end, value in zip(tier.start_ms, tier.end_ms, values)
+        if value is not None
+    ]
+    if element is None:
+        entries = {entry.value: entry.identifier for entry in vocabulary.entries} if vocabulary else {}
+    return _Placement(
+        channel,
+        tier_id,
+        element,
+        aligned,
+        values,
+        rows,
+        entries or {},
+        vocabulary if element is None else None,
+        _meaning(labels, values),
+    )
+
+
+def _meaning(labels: Sequence[str | None], values: Sequence[str | None]) -> dict[str, str]:
+    """Value and our label, for the values that stand for one label and are not the label itself."""
+    stands_for: dict[str, set[str]] = {}
+    for label, value in zip(labels, values):
+        if label is not None and value is not None:
+            stands_for.setdefault(value, set()).add(label)
+    return {value: next(iter(found)) for value, found in stands_for.items() if len(found) == 1 and found != {value}}
+
+
+def _refuse_losses(root: etree._Element, group: list[_Placement], file: Path) -> None:
+    """Refuse when annotations of others hang on, or link to, those that would be rewritten."""
+    own = {placement.tier_id for placement in group}
+    for child in root.iterfind("TIER"):
+        if child.get("PARENT_REF") in own and child.get("TIER_ID") not in own and child.find("ANNOTATION") is not None:
+            raise SignfaceError(
+                f"the tier {child.get('TIER_ID')} hangs on {child.get('PARENT_REF')} and would lose its annotations",
+                file=file,
+                hint="move them to a tier of their own first",
+            )
+    going = {
+        annotation.get("ANNOTATION_ID")
+        for placement in group
+        if placement.element is not None
+        for annotation in placement.element.iterfind("ANNOTATION/*")
+    }
+    for link in root.iterfind("REF_LINK_SET/*"):
+        targets = {link.get("REF1"), link.get("REF2"), *(link.get("REFS") or "").split()}
+        if targets & going:
+            raise SignfaceError(
+                f"the link {link.get('REF_LINK_ID')} refers to annotations that would be replaced",
+                file=file,
+                hint="remove the link first",
+            )
+
+
+def _empty(root: etree._Element, tier: etree._Element) -> None:
+    """Take the annotations out of a tier, and the time slots that only they used."""
+    slots = set()
+    for annotation in tier.findall("ANNOTATION"):
+        slots |= {annotation[0].get("TIME_SLOT_REF1"), annotation[0].get("TIME_SLOT_REF2")}
+        tier.remove(annotation)
+    for annotation in root.iterfind("TIER/ANNOTATION/ALIGNABLE_ANNOTATION"):
+        slots -= {annotation.get("TIME_SLOT_REF1"), annotation.get("TIME_SLOT_REF2")}
+    order = root.find("TIME_ORDER")
+    for slot in order.findall("TIME_SLOT"):
+        if slot.get("TIME_SLOT_ID") in slots:
+            order.remove(slot)
+
+
+def _write(
+    root: etree._Element, tier: Tier, group: list[_Placement], slots: TimeSlots, fresh_id: Callable[[str], str]
+) -> None:
+    """Make the tiers that are missing, with their types and vocabularies, and fill them all."""
+    parent = group[0]
+    identifiers: list[str | None] = []
+    for placement in group:
+        if placement.element is None:
+            placement.element = tier_element(
+                placement.tier_id, _type(root, placement), tier.signer, None if placement.aligned else parent.tier_id
+            )
+            insert_in_order(root, placement.element)
+        if placement.aligned:
+            made = aligned_annotations(
+                placement.element, tier.start_ms, tier.end_ms, placement.values, placement.entries, slots, fresh_id
+            )
+            identifiers = made if placement is parent else identifiers
+        else:
+            dependent_annotations(placement.element, identifiers, placement.values, placement.entries, fresh_id)
+
+
+def _type(root: etree._Element, placement: _Placement) -> str:
+    """Name of a linguistic type for a tier of ours; it and its vocabulary are added unless the like is there."""
+    wanted = type_element(placement.channel, _vocabulary(root, placement), dependent=not placement.aligned)
+    existing = {kind.get("LINGUISTIC_TYPE_ID"): kind for kind in root.iterfind("LINGUISTIC_TYPE")}
+    for name in (placement.channel, f"{placement.channel} (signface)"):
+        kind = existing.get(name)
+        if kind is None:
+            wanted.set("LINGUISTIC_TYPE_ID", name)
+            insert_in_order(root, wanted)
+            if not placement.aligned:
+                _constraint(root, "Symbolic_Association")
+            return name
+        if all(kind.get(key) == wanted.get(key) for key in ("CONSTRAINTS", "CONTROLLED_VOCABULARY_REF")):
+            return name
+    raise SignfaceError(f"has linguistic types named {placement.channel} of another kind", hint="rename them in ELAN")
+
+
+def _vocabulary(root: etree._Element, placement: _Placement) -> str | None:
+    """Name of the vocabulary for a tier of ours; it is added unless one with all its entries is there."""
+    vocabulary = placement.vocabulary
+    if vocabulary is None:
+        return None
+    existing = {cv.get("CV_ID"): cv for cv in root.iterfind("CONTROLLED_VOCABULARY")}
+    for name in (vocabulary.name, f"{vocabulary.name} (signface)"):
+        found = existing.get(name)
+        if found is None:
+            language = next((e for e in root.iterfind("LANGUAGE") if e.get("LANG_ID") == LANGUAGE["LANG_ID"]), None)
+            if language is None:
+                insert_in_order(root, etree.Element("LANGUAGE", LANGUAGE))
+            insert_in_order(root, vocabulary_element(vocabulary, name))
+            return name
+        entries = {entry.get("CVE_ID") for entry in found.iterfind("CV_ENTRY_ML")}
+        if entries >= {entry.identifier for entry in vocabulary.entries}:
+            return name
+    raise SignfaceError(f"has vocabularies named {vocabulary.name} of another kind", hint="rename them in ELAN")
+
+
+def _constraint(root: etree._Element, name: str) -> None:
+    if not any(constraint.get("STEREOTYPE") == name for constraint in root.iterfind("CONSTRAINT")):
+        insert_in_order(root, etree.Element("CONSTRAINT", STEREOTYPE=name, DESCRIPTION=CONSTRAINTS[name]))
