@@ -1,0 +1,91 @@
+"""Labels of a take are matched with a layout's: prefixes, case, two signers, and clear words where they do not fit."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from signface.errors import SignfaceError
+from signface.takes.labels import clean_labels, match_labels, rename_to
+from signface.takes.take import Take
+
+
+def take_of(labels):
+    """A take of two frames in which the x of every marker is its place in the list."""
+    positions = np.zeros((2, len(labels), 3))
+    positions[..., 0] = np.arange(len(labels))
+    return Take(positions, labels, 100.0, name="t")
+
+
+LAYOUT = ["LBRO1", "LBRO2", "RBRO1", "RBRO2", "NOSE", "CHIN"]
+
+
+def test_the_take_gets_the_layouts_names_and_order():
+    renamed = rename_to(take_of(["CHIN", "NOSE", "RBRO2", "RBRO1", "LBRO2", "LBRO1", "ELBOW"]), LAYOUT)
+    assert renamed.labels == tuple(LAYOUT)
+    assert renamed.positions[0, :, 0].tolist() == [5, 4, 3, 2, 1, 0]
+    assert "rename_to 6 of 6 markers; not in the layout: ELBOW" in renamed.history[-1]
+
+
+@pytest.mark.parametrize("written", ["Anna:{}", "Anna:face:{}", "{}", " {} ", "lower", "L_BRO", "Anna: {}"])
+def test_prefixes_case_and_separators_do_not_matter(written):
+    labels = {
+        "lower": [label.lower() for label in LAYOUT],
+        "L_BRO": [f"{label[0]}_{label[1:]}" for label in LAYOUT],
+    }.get(written, [written.format(label) for label in LAYOUT])
+    assert rename_to(take_of(labels), LAYOUT).labels == tuple(LAYOUT)
+
+
+def test_of_two_signers_the_one_who_fits_best_is_taken():
+    labels = ["Bea:LBRO1", "Bea:NOSE", *(f"Anna:{label}" for label in LAYOUT)]
+    assert rename_to(take_of(labels), LAYOUT).positions[0, :, 0].tolist() == [2, 3, 4, 5, 6, 7]
+
+
+def test_an_exact_name_wins_over_a_prefixed_one():
+    labels = ["Wand:NOSE", *LAYOUT]
+    assert rename_to(take_of(labels), LAYOUT).positions[0, 4, 0] == 5
+
+
+def test_missing_markers_are_left_out_and_named_with_close_names():
+    renamed = rename_to(take_of(["LBRO1", "LBRO2", "RBROW1", "NOSE"]), LAYOUT)
+    assert renamed.labels == ("LBRO1", "LBRO2", "NOSE")
+    assert "missing: RBRO1 (close: RBROW1)" in renamed.history[-1]
+
+
+def test_a_take_of_another_marker_set_is_refused_with_the_names():
+    with pytest.raises(SignfaceError) as refused:
+        rename_to(take_of(["LBRW1", "LBRW2", "RBRW1", "RBRW2", "NOSE"]), LAYOUT)
+    line = str(refused.value)
+    assert "only 1 of the layout's 6 markers are in the take" in line
+    assert "LBRO1 (close: LBRW1" in line
+    assert "the take also has LBRW1, LBRW2" in line
+    assert "Choose the layout" in line
+
+
+def test_unlabelled_points_have_no_label():
+    kept, names, notes = clean_labels(["*1", "A", "Anna:*12", "", "unlabeled_7", "U_3", "B", "Unnamed"])
+    assert kept == [1, 6]
+    assert names == ["A", "B"]
+    assert notes == ["ignored 6 unlabelled points"]
+
+
+@given(labels=st.lists(st.text(alphabet="AaBb*:1_ ~2", max_size=5), max_size=12))
+@settings(max_examples=200, deadline=None)
+def test_clean_labels_are_unique_and_in_order(labels):
+    kept, names, _ = clean_labels(labels)
+    assert len(set(names)) == len(names) == len(kept)
+    assert kept == sorted(kept)
+
+
+@given(
+    take=st.lists(st.text(alphabet="AaB:_1", min_size=1, max_size=4), unique=True, max_size=10),
+    wanted=st.lists(st.text(alphabet="AaB_1", min_size=1, max_size=3), unique=True, max_size=8),
+)
+@settings(max_examples=200, deadline=None)
+def test_no_marker_is_matched_twice_and_exact_names_always_are(take, wanted):
+    found = match_labels(take, wanted)
+    assert len(set(found.values())) == len(found)
+    assert set(found.values()) <= set(take)
+    assert set(found) <= set(wanted)
+    for label in set(take) & set(wanted):
+        assert found[label] == label
