@@ -59,7 +59,7 @@ def test_what_is_written_is_read_back(kind, tmp_path):
     assert take.labels == RECORDED.labels
     assert take.rate == RECORDED.rate
     assert take.name == "take"
-    assert "take.any" in take.history[0]
+    assert "take.any" in " ".join(take.history)
     np.testing.assert_array_equal(np.isnan(take.positions), np.isnan(RECORDED.positions))
     np.testing.assert_allclose(take.positions, RECORDED.positions, atol=precision)
 
@@ -125,7 +125,7 @@ def test_a_c3d_file_may_name_a_unit_for_each_point(tmp_path):
     c3d_parts(RECORDED.positions / factors[:, None], units=units).write(str(file))
     take = read_take(file)
     np.testing.assert_allclose(take.positions, RECORDED.positions, rtol=1e-5, atol=1e-3)
-    assert "one per marker" in take.history[0]
+    assert "one per marker" in " ".join(take.history)
 
 
 @pytest.mark.parametrize(("factor", "unit"), [(1000.0, "m"), (10.0, "cm"), (1.0, "mm")])
@@ -138,7 +138,7 @@ def test_a_unit_nobody_names_is_inferred_from_the_width_of_the_face(kind, factor
     else:
         write_table(scaled, file)
     take = read_take(file)
-    assert f"unit {unit} (not in the file" in take.history[0]
+    assert f"unit {unit} (not in the file" in " ".join(take.history)
     np.testing.assert_allclose(take.positions, RECORDED.positions, rtol=1e-4, atol=0.01)
 
 
@@ -161,8 +161,8 @@ def test_unlabelled_points_are_ignored_with_a_note_and_repeated_labels_numbered(
     c3d_parts(labels=labels).write(str(tmp_path / "take.c3d"))
     take = read_take(tmp_path / "take.c3d")
     assert take.labels == ("Anna:A", "A", "A~2", *RECORDED.labels[6:])
-    assert "ignored 3 unlabelled points" in take.history[0]
-    assert "numbered repeated labels: A" in take.history[0]
+    assert "ignored 3 unlabelled points" in " ".join(take.history)
+    assert "numbered repeated labels: A" in " ".join(take.history)
     np.testing.assert_allclose(take.positions[:, 1], RECORDED.positions[:, 2], rtol=1e-5)
 
 
@@ -254,7 +254,7 @@ def test_a_pose_file_becomes_a_right_handed_face_in_millimetres(turn, tmp_path):
     assert outer[0] > 0
     nose = face["1"] - (face["33"] + face["263"]) / 2
     assert np.dot(np.cross(outer, up), nose) > 0, "mirrored"
-    assert "263 are 89.5 mm apart" in take.history[0]
+    assert "263 are 89.5 mm apart" in " ".join(take.history)
 
 
 def test_the_scale_of_a_pose_file_is_one_for_the_whole_take(tmp_path):
@@ -279,13 +279,13 @@ def test_landmarks_without_confidence_are_missing_and_the_person_seen_most_is_ta
     confidence[2, 1, 3] = 0
     take = read_take(write_pose(tmp_path / "two.pose", landmarks, list(LANDMARKS), confidence=confidence))
     assert np.argwhere(np.isnan(take.positions[..., 0])).tolist() == [[2, 3]]
-    assert "person 2 of 2" in take.history[0]
+    assert "person 2 of 2" in " ".join(take.history)
 
 
 def test_a_pose_file_without_depth_is_a_flat_face(tmp_path):
     take = read_take(write_pose(tmp_path / "flat.pose", pictured()[..., :2], list(LANDMARKS)))
     assert np.ptp(take.positions[..., 2]) == 0
-    assert "the face is flat" in take.history[0]
+    assert "the face is flat" in " ".join(take.history)
 
 
 def test_a_real_signer_has_a_human_face(signer_pose):
@@ -325,7 +325,7 @@ def test_frames_that_the_phone_dropped_are_filled_so_that_the_rate_is_even(tmp_p
     assert recording.n_frames == 130
     assert recording.duration == pytest.approx(130 / 60)
     np.testing.assert_allclose(recording.weights[:, 0], np.arange(130) / 130.0, atol=1e-6)
-    assert "filled 3 dropped frames" in recording.history[0]
+    assert "filled 3 dropped frames" in " ".join(recording.history)
 
 
 def test_a_phone_that_records_at_twice_the_rate_of_its_timecode_keeps_its_own_rate(tmp_path):

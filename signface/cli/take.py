@@ -71,6 +71,7 @@ def describe_take(take: Take, *, face: str = "default") -> dict[str, Any]:
         "rate_hz": take.rate,
         "duration_s": round(take.duration, 6),
         "start_s": take.start,
+        "unit_found": next((entry.removeprefix("unit ") for entry in take.history if entry.startswith("unit")), "mm"),
         "markers": list(take.labels),
         "gaps": gaps,
         **_recognised(take, face),
@@ -107,6 +108,7 @@ def _report(file: str, content: dict[str, Any]) -> str:
         lines.append(f"  weights of {len(content['bases'])} bases: {_shortened(content['bases'])}")
     else:
         gaps = content["gaps"]
+        lines.append(f"  unit found: {content['unit_found']}; millimetres from here on")
         lines.append(f"  {len(content['markers'])} markers: {_shortened(content['markers'])}")
         if not gaps:
             lines.append("  gaps: none")

@@ -117,7 +117,7 @@ def read_c3d(path: str | PathLike[str], *, unit: str | None = None) -> Take:
         rate,
         start=_first_frame(parameters, header) / rate,
         name=file.stem,
-        history=("; ".join([f"read {file.name} (C3D, {note})", *notes]),),
+        history=(f"read {file.name} (C3D)", note, *notes),
     )
 
 

@@ -125,5 +125,5 @@ def read_livelink(path: str | PathLike[str]) -> Descriptors:
         rate=rate,
         head=head,
         name=file.stem,
-        history=("; ".join(notes),),
+        history=tuple(notes),
     )

@@ -130,11 +130,11 @@ def read_pose(path: str | PathLike[str], *, unit: str | None = None) -> Take:
         scale, scale_note = _millimetres_per_pixel(landmarks, names)
     except SignfaceError as error:
         raise SignfaceError(error.problem, file=file, hint="extract it with MediaPipe Holistic") from error
-    note = f"{scale:.4g} mm a pixel, so that {scale_note} (an adult's eyes)"
+    note = f"unit pixel, {scale:.4g} mm each, so that {scale_note} (an adult's eyes)"
     return Take(
         landmarks * (scale, -scale, -scale),
         tuple(names),
         rate,
         name=file.stem,
-        history=("; ".join([f"read {file.name} (.pose, {note})", *notes, *depth_notes]),),
+        history=(f"read {file.name} (.pose)", note, *notes, *depth_notes),
     )

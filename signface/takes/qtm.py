@@ -96,5 +96,5 @@ def read_qtm(path: str | PathLike[str], *, unit: str | None = None) -> Take:
         rate,
         start=start if math.isfinite(start) else 0.0,
         name=file.stem,
-        history=("; ".join([f"read {file.name} (Qualisys TSV, {note})", *notes]),),
+        history=(f"read {file.name} (Qualisys TSV)", note, *notes),
     )

@@ -85,7 +85,7 @@ def read_table(path: str | PathLike[str], *, unit: str | None = None) -> Take:
         rate,
         start=float(values[0, 0]),
         name=file.stem,
-        history=("; ".join([f"read {file.name} (CSV, {note})", *notes]),),
+        history=(f"read {file.name} (CSV)", note, *notes),
     )
 
 

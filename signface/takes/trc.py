@@ -79,5 +79,5 @@ def read_trc(path: str | PathLike[str], *, unit: str | None = None) -> Take:
         rate,
         start=start if math.isfinite(start) else 0.0,
         name=file.stem,
-        history=("; ".join([f"read {file.name} (TRC, {note})", *notes]),),
+        history=(f"read {file.name} (TRC)", note, *notes),
     )

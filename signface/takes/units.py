@@ -113,4 +113,4 @@ def to_millimetres(
     each = [unit or named[0] for unit in units[:markers]]
     each += [each[-1]] * (markers - len(each))
     factors = np.array([millimetres_per(unit) for unit in each])
-    return positions * factors[:, None], f"units {', '.join(sorted(set(each)))} (one per marker)"
+    return positions * factors[:, None], f"unit {', '.join(sorted(set(each)))} (one per marker)"
