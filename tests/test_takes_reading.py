@@ -214,6 +214,15 @@ def test_a_csv_of_another_country_is_read(separator, tmp_path):
     np.testing.assert_allclose(read_take(tmp_path / "t.csv").positions, RECORDED.positions, atol=1e-5)
 
 
+@pytest.mark.parametrize("digits", [3, 6])
+@pytest.mark.parametrize("rate", [25.0, 29.97, 59.94, 120.0, 200.0])
+def test_the_rate_of_a_csv_is_told_from_rounded_times(rate, digits, tmp_path):
+    times = np.arange(round(20 * rate)) / rate
+    rows = "".join(f"{time:.{digits}f},1,2,3\n" for time in times)
+    (tmp_path / "t.csv").write_text(f"time_s,A_x,A_y,A_z\n{rows}")
+    assert read_take(tmp_path / "t.csv").rate == pytest.approx(rate, rel=1e-4 if digits == 3 else 1e-6)
+
+
 def test_the_start_of_a_csv_is_its_first_time(tmp_path):
     later = RECORDED.changed("later", start=12.34)
     write_table(later, tmp_path / "t.csv")

@@ -100,7 +100,8 @@ def even_rate(times: np.ndarray, file: Path) -> float:
     """Frames per second (Hz) from times in seconds that rise evenly.
 
     Times are often written with three digits, so that 1/120 s comes as 0.008, 0.017: the mean step over the whole
-    file is right where single steps are not. A rate within 0.1 % of a whole number is that number.
+    file is right where single steps are not. Where a whole number is within that rounding, it is the rate; 29.97 Hz
+    stays 29.97 Hz in any file long enough to tell.
 
     Raises
     ------
@@ -113,10 +114,11 @@ def even_rate(times: np.ndarray, file: Path) -> float:
     if not np.isfinite(times).all() or not (steps > 0).all():
         raise SignfaceError("its times do not rise from row to row", file=file, hint="export it again")
     step = float(times[-1] - times[0]) / (len(times) - 1)
-    digits = 0.0011  # times rounded to a millisecond
-    if np.abs(steps - step).max() > 0.5 * step + digits:
+    rounding = 0.0005 if np.allclose(times * 1000, np.round(times * 1000), rtol=0, atol=1e-6) else 0.0000005
+    if np.abs(steps - step).max() > 0.25 * step + 2 * rounding:
         raise SignfaceError(
             "its times do not rise evenly", file=file, hint="export it at one rate, with empty cells for gaps"
         )
     rate = 1 / step
-    return float(round(rate)) if abs(rate - round(rate)) < 1e-3 * rate else rate
+    unsure = rate * 2 * rounding / float(times[-1] - times[0])
+    return float(round(rate)) if abs(rate - round(rate)) <= unsure and round(rate) > 0 else rate
