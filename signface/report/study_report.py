@@ -45,7 +45,8 @@ READING = (
     "Kruskal-Wallis and Scheirer-Ray-Hare, the rank-biserial correlation r for pairs, ρ for correlations, with the "
     "usual words for their size.",
     "Conditions: Spearman wants a monotone relation, χ² an expected count of 5 in each cell, Kruskal-Wallis 5 answers "
-    "in each group, Scheirer-Ray-Hare 5 in each cell, Wilcoxon 20 pairs that differ. Where one is not met, the table says so.",
+    "in each group, Scheirer-Ray-Hare 5 in each cell, Wilcoxon 20 pairs that differ. Where one is not met, the table "
+    "says so.",
     "All these tests but those on pairs take answers as independent of each other. They are not: a participant gives "
     "many. For methods, which every participant sees, this mostly hides differences; for age, gender, vision or habit, "
     "which belong to the participant, it finds differences that are not there. The part with participants as random "

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from signface.study.findings import findings
+from signface.study.model_tables import compare_methods, contrasts_table, models_table, posthoc_table
 from signface.study.participant_tables import (
     group_table,
     habit_table,
@@ -16,6 +18,7 @@ from signface.study.participant_tables import (
     influence_table,
     remarks_table,
 )
+from signface.study.power import power_table
 from signface.study.responses import Responses
 from signface.study.tables import StudyTable
 from signface.study.thesis_tables import (
@@ -96,6 +99,8 @@ def analyse(responses: Responses, *, alpha: float = 0.05, resamples: int = 2000,
     """
     compare = len(responses.methods) > 1
     influences = influence_results(responses)
+    said: tuple[str, ...] = ()
+    hypotheses = hypotheses_table(responses)
     sections = [
         Section(
             "methods",
@@ -103,14 +108,23 @@ def analyse(responses: Responses, *, alpha: float = 0.05, resamples: int = 2000,
             "Means, then one null hypothesis per question tested between all methods, then every pair of methods.",
             tuple(
                 [means_table(responses)]
-                + (
-                    [hypotheses_table(responses), pairwise_table(responses), pairwise_matrix(responses)]
-                    if compare
-                    else []
-                )
+                + ([hypotheses, pairwise_table(responses), pairwise_matrix(responses)] if compare else [])
             ),
         ),
     ]
+    if compare:
+        comparisons = {column: compare_methods(responses, column) for column in responses.questions}
+        contrasts = contrasts_table(responses, comparisons, resamples=resamples, seed=seed)
+        power = power_table(responses, alpha=alpha)
+        said = findings(responses, comparisons, hypotheses, contrasts, power, alpha=alpha)
+        sections.append(
+            Section(
+                "models",
+                "Do the methods differ when a participant's answers belong together?",
+                "The same questions asked of models and tests that know who answered.",
+                (models_table(responses, comparisons), contrasts, posthoc_table(responses), power),
+            )
+        )
     crossed = interactions_table(
         responses,
         [("expression", "method"), ("intensity", "method")],
@@ -156,4 +170,4 @@ def analyse(responses: Responses, *, alpha: float = 0.05, resamples: int = 2000,
                 tuple(about),
             )
         )
-    return Analysis(responses, tuple(sections), alpha, seed, resamples)
+    return Analysis(responses, tuple(sections), alpha, seed, resamples, said)

@@ -106,8 +106,8 @@ def influence_table(responses: Responses, results: list[Influence]) -> StudyTabl
         (
             "ρ: Spearman. χ²: contingency table, Yates' correction for 2 × 2. H: Kruskal-Wallis. "
             "* on the mean accuracy of each participant.",
-            "Tests over answers count each answer of a participant as independent, which overstates the influence of what "
-            "belongs to the participant; the details give the same tests over participants.",
+            "Tests over answers count each answer of a participant as independent, which overstates the influence of "
+            "what belongs to the participant; the details give the same tests over participants.",
         ),
     )
 
