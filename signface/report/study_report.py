@@ -228,8 +228,8 @@ def _figures(analysis: Analysis) -> dict[str, list[dict[str, str]]]:
             {
                 "name": "means_by_method",
                 "svg": means_figure(responses, resamples=analysis.resamples, seed=analysis.seed),
-                "caption": "Means by method. Bars: 95 % bootstrap intervals over participants. The vertical axes are cut "
-                "to show differences; compare the numbers, not the heights.",
+                "caption": "Means by method. Bars: 95 % bootstrap intervals over participants. The vertical axes are "
+                "cut to show differences; compare the numbers, not the heights.",
             }
         ],
         "expressions": [],
@@ -240,7 +240,7 @@ def _figures(analysis: Analysis) -> dict[str, list[dict[str, str]]]:
             {
                 "name": "confusion",
                 "svg": matrix,
-                "caption": "Confusion matrices: of all answers to films of one played expression, the per cent that "
+                "caption": "Confusion matrices: of all answers to films of an expression, the per cent that "
                 "named each expression.",
             }
         )

@@ -97,6 +97,13 @@ def analyse(responses: Responses, *, alpha: float = 0.05, resamples: int = 2000,
     seed : int
         Of the bootstrap.
     """
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1, "blas"):  # small matrices: threads that wait for each other cost more than they give
+        return _analyse(responses, alpha, resamples, seed)
+
+
+def _analyse(responses: Responses, alpha: float, resamples: int, seed: int) -> Analysis:
     compare = len(responses.methods) > 1
     influences = influence_results(responses)
     said: tuple[str, ...] = ()

@@ -64,7 +64,7 @@ def findings(
         if model_p < alpha and differing:
             sentence = f"{name.capitalize()}: {'; '.join(differing)} ({test}; {model})."
         elif model_p < alpha:
-            sentence = f"{name.capitalize()}: the methods differ, but no single pair does with Holm's correction ({test}; {model})."
+            sentence = f"{name.capitalize()}: the methods differ, but no pair alone does ({test}; {model})."
         else:
             least = power.frame.loc[power.frame["question"] == name, "found with 80 %"].max()
             missed = "" if math.isnan(least) else f" A difference below {least:.2f} would likely be missed."

@@ -92,7 +92,8 @@ class OrdinalMixedModel:
         self._fixed = np.asarray(fixed, float)
         self._cuts = len(values) - 1
         # each answer belongs to one level of each grouping: its columns of Z, which is never written out
-        columns, sizes = [], []
+        columns: list[NDArray[np.intp]] = []
+        sizes: list[int] = []
         for grouping in groupings:
             level = np.unique(np.asarray(grouping).astype(str), return_inverse=True)[1]
             columns.append(level + sum(sizes))
@@ -132,8 +133,8 @@ class OrdinalMixedModel:
         return OrdinalFit(
             self._thresholds(found.x[:cuts]),
             found.x[part],
-            covariance[part, part],
-            np.abs(found.x[cuts + width :]),
+            np.asarray(covariance[part, part], float),
+            np.abs(found.x[cuts + width :]).astype(float),
             -float(found.fun),
             bool(gradient < 1e-2 and np.isfinite(found.fun)),
         )
@@ -175,8 +176,8 @@ class OrdinalMixedModel:
         factor = np.linalg.cholesky(hessian)
         value = curves.log.sum() - 0.5 * modes @ modes - np.log(np.diag(factor)).sum()
 
-        # The gradient has three parts: the answers' own, that of ½log|H| at a fixed mode, and that of ½log|H| through the
-        # mode. `leverage` is z_i'H⁻¹z_i of each answer; `along` carries a change of the modes to a change of ½log|H|.
+        # The gradient has three parts: the answers' own, that of ½log|H| at a fixed mode, and that of ½log|H| through
+        # the mode. `leverage` is z_i'H⁻¹z_i of each answer; `along` carries a change of the modes to a change of ½log|H|.
         inverse = np.linalg.inv(hessian)
         spread_inverse = scale[:, None] * inverse * scale
         leverage = np.zeros(len(base))
@@ -259,9 +260,9 @@ class OrdinalMixedModel:
 
 
 class _Curves:
-    """The log-likelihood of each answer, log(F(u) − F(l)) with u = θ_above − η and l = θ_below − η, and its derivatives.
+    """The log-likelihood of each answer, log(F(u) − F(l)), u = θ_above − η and l = θ_below − η, and its derivatives.
 
-    `eta`: by η. `weight`: minus the second by η. `weight_eta`: of `weight` by η. `upper`, `lower`: by the two thresholds;
+    `eta`: by η. `weight`: minus the second by η. `weight_eta`: of `weight` by η. `upper`, `lower`: by the thresholds;
     `eta_upper`, `weight_lower` and the like: of `eta` and `weight` by them. All (n,).
     """
 

@@ -228,9 +228,9 @@ def models_table(responses: Responses, comparisons: dict[str, MethodComparison])
         kinds,
         notes=(
             "Mixed model: cumulative logit (logistic for accuracy) with random intercepts for participants, for "
-            "participants × methods (reactions) and for what was played (stimuli); likelihood-ratio test of the methods. "
-            "Population-averaged: generalised estimating equations, participants as clusters. Over participants: Friedman "
-            "(Wilcoxon for two methods) on one mean per participant and method.",
+            "participants × methods (reactions) and for what was played (stimuli); likelihood-ratio test of the "
+            "methods. Population-averaged: generalised estimating equations, participants as clusters. Over "
+            "participants: Friedman (Wilcoxon for two methods) on one mean per participant and method.",
             *notes,
         ),
     )
@@ -295,9 +295,9 @@ def contrasts_table(
         pd.DataFrame(rows),
         kinds,
         notes=(
-            "Difference: mean of the first method less mean of the second; its interval is a bootstrap over participants. "
-            "Odds ratio and p: mixed model; above 1 where the first method is answered higher. r and p over participants: "
-            "Wilcoxon on one mean per participant and method. Holm's correction within a question.",
+            "Difference: mean of the first method less mean of the second; its interval is a bootstrap over "
+            "participants. Odds ratio and p: mixed model; above 1 where the first method is answered higher. r and p "
+            "over participants: Wilcoxon on one mean per participant and method. Holm's correction within a question.",
         ),
     )
 
@@ -334,8 +334,8 @@ def posthoc_table(responses: Responses) -> StudyTable:
         pd.DataFrame(rows),
         RESULT_KINDS,
         notes=(
-            "Accuracy: Cochran's Q and McNemar's exact test on the pairs of a participant and what was played; b counts "
-            "what only the first method got right, Δ is the difference of the shares. Scales: Dunn's z after "
+            "Accuracy: Cochran's Q and McNemar's exact test on the pairs of a participant and what was played; b "
+            "counts what only the first method got right, Δ is the difference of the shares. Scales: Dunn's z after "
             "Kruskal-Wallis; r is the rank-biserial correlation of the two groups of answers.",
         ),
     )

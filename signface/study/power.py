@@ -98,8 +98,8 @@ def power_table(responses: Responses, *, alpha: float = 0.05) -> StudyTable:
         pd.DataFrame(rows),
         {"participants": "count"},
         notes=(
-            f"Wilcoxon's test over participants' means at the level {alpha:g} with a power of {POWER:.0%}, uncorrected for "
-            "several pairs; the spread is this study's own, its difference plays no part.",
+            f"Wilcoxon's test over participants' means at the level {alpha:g} with a power of {POWER:.0%}, uncorrected "
+            "for several pairs; the spread is this study's own, its difference plays no part.",
         ),
     )
 
