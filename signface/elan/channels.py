@@ -1,0 +1,57 @@
+"""`channel_tiers`: the events of the further channels as tiers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from signface.elan.tiers import DependentTier, Tier, milliseconds
+from signface.elan.vocabularies import Entry, Vocabulary
+from signface.label.channels import ChannelEvents
+
+#: Okabe and Ito's colours, in turn for the values of a channel.
+COLOURS = (
+    (230, 159, 0),
+    (86, 180, 233),
+    (0, 158, 115),
+    (240, 228, 66),
+    (0, 114, 178),
+    (213, 94, 0),
+    (204, 121, 167),
+)
+
+
+def channel_tiers(channels: Sequence[ChannelEvents], signer: str = "") -> list[Tier]:
+    """One tier `CHANNEL@SIGNER` for each channel, with its closed vocabulary.
+
+    Cycles and amplitude (degrees) of head movements go to tiers that hang on it: `head-cycles`, `head-amplitude`.
+
+    Parameters
+    ----------
+    channels : sequence of ChannelEvents
+        What `signface.label.channels.find_channels` returns.
+    signer : str
+    """
+    tiers = []
+    for found in channels:
+        table = found.table[found.table["end_s"] > 0.0005]
+        start_ms, end_ms = milliseconds(table["start_s"].clip(lower=0).to_numpy(float), table["end_s"].to_numpy(float))
+        dependents = []
+        for column, channel, digits in (("cycles", "cycles", 1), ("amplitude_deg", "amplitude", 0)):
+            if column in table.columns:
+                numbers = table[column].to_numpy(float)
+                shown = tuple(f"{number:.{digits}f}" if np.isfinite(number) else None for number in numbers)
+                dependents.append(DependentTier(f"{found.channel}-{channel}", shown))
+        values = tuple(str(value) for value in table["value"])
+        tiers.append(Tier(found.channel, signer, start_ms, end_ms, values, vocabulary_of(found), tuple(dependents)))
+    return tiers
+
+
+def vocabulary_of(channel: ChannelEvents) -> Vocabulary:
+    """The closed vocabulary of a channel."""
+    entries = (
+        Entry(value, description, COLOURS[number % len(COLOURS)])
+        for number, (value, description) in enumerate(channel.values.items())
+    )
+    return Vocabulary(channel.channel, channel.description, tuple(entries))
