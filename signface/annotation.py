@@ -115,8 +115,7 @@ def describe(
 
     face = read_face("default") if face is None else face
     layout = choose_layout(recording.labels, face) if layout is None else layout
-    options = {} if alpha is None else {"alpha": alpha}
-    return solve_take(recording, face, layout, neutral=neutral, method=method, **options)
+    return solve_take(recording, face, layout, neutral=neutral, method=method, alpha=alpha)
 
 
 def write_annotation(

@@ -1,0 +1,62 @@
+"""`signface solve`: recordings to blendshape weights."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from signface.cli.options import add_solve_arguments, output_files, read_face_and_layout
+from signface.cli.progress import progress
+from signface.errors import SignfaceError
+
+EXAMPLE = """  signface solve take.c3d -o weights.csv
+  signface solve recordings/*.c3d -o weights/ --format parquet"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Fill the parser of this command."""
+    parser.add_argument("takes", nargs="+", type=Path, metavar="TAKE", help="recordings")
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="FILE", help=".csv or .parquet; a folder for several takes"
+    )
+    parser.add_argument(
+        "--format", choices=("csv", "parquet"), default="csv", help="ending in a folder (default: %(default)s)"
+    )
+    add_solve_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Solve every take; those that cannot be are named, and the others still are."""
+    from signface.annotation import describe, median_residual
+    from signface.descriptors import write_weights
+    from signface.takes.reading import read_recording
+
+    ending = arguments.output.suffix.lower()
+    suffix = ending if ending in (".csv", ".parquet") else f".{arguments.format}"
+    if ending and ending not in (".csv", ".parquet") and not arguments.output.is_dir() and len(arguments.takes) == 1:
+        raise SignfaceError("the ending of a weights file is .csv or .parquet", file=arguments.output)
+    files = output_files(arguments.takes, arguments.output, suffix)
+    face, layout = read_face_and_layout(arguments)
+    failed = 0
+    for take, file in progress(list(zip(arguments.takes, files, strict=True)), "solving"):
+        try:
+            descriptors = describe(
+                read_recording(take),
+                face=face,
+                layout=layout,
+                neutral=arguments.neutral,
+                method=arguments.method,
+                alpha=arguments.alpha,
+            )
+            write_weights(descriptors, file)
+        except SignfaceError as error:
+            if len(files) == 1:
+                raise
+            failed += 1
+            print(f"signface: {error}", file=sys.stderr)
+            continue
+        residual = median_residual(descriptors)
+        fit = "unknown" if residual is None else f"{residual:.2f} mm"
+        print(f"{file}: {descriptors.n_frames} frames, {len(descriptors.names)} bases, median residual {fit}")
+    return 2 if failed else 0

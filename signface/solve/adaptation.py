@@ -1,0 +1,142 @@
+"""Morphological adaptation: marker positions on the signer's face, carried to the avatar's face.
+
+Seed 001, 5.2.2, eq. 5.18 to 5.20: a triharmonic radial basis function with an affine part through the P neutral
+markers of signer and avatar.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from signface.errors import SignfaceError
+
+#: Singular values of the neutral markers' affine part below this share of the largest count as zero: along such a
+#: direction (across a plane of markers) the markers say nothing of how the two faces differ.
+FLAT = 1e-6
+
+#: Neutral markers nearer to each other than this share of the cloud's size stand on one point.
+COINCIDENT = 1e-6
+
+#: Frames are transformed this many at a time, so that the distances of a long take never lie in memory together.
+FRAMES_AT_A_TIME = 512
+
+
+class MorphologicalAdaptation:
+    """Map positions on one face to the corresponding positions on another (eq. 5.18).
+
+    Per coordinate, `F(m) = sum_k u_k |m - M0_k|^3 + a x + b y + c z + d`, with `F(M0_k)` the avatar's marker k. The
+    system is solved in coordinates centred on the markers and divided by their size, so that the unit of length
+    plays no part.
+
+    Where the neutral markers lie in a plane or on a line, the affine part across it is not determined by them. It
+    is then taken from the best similarity (rotation and scale) between the two clouds: markers leaving the plane
+    keep their way out of it, scaled as the face is.
+
+    Parameters
+    ----------
+    source : (P, 3) array
+        Neutral markers on the signer.
+    target : (P, 3) array
+        The same markers on the neutral avatar.
+
+    Raises
+    ------
+    SignfaceError
+        There are fewer than 4 markers, a position is not finite, or markers coincide.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> square = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0], [1, 1, 1]])
+    >>> MorphologicalAdaptation(square, 2 * square).transform(np.array([[0.5, 0.5, 0.0]])).round(9)
+    array([[1., 1., 0.]])
+    """
+
+    def __init__(self, source: np.ndarray, target: np.ndarray) -> None:
+        source, target = np.asarray(source, dtype=np.float64), np.asarray(target, dtype=np.float64)
+        if source.shape != target.shape or source.ndim != 2 or source.shape[1] != 3:
+            raise SignfaceError(
+                f"neutral markers of shapes {source.shape} and {target.shape} do not correspond: both must be (P, 3)"
+            )
+        if len(source) < 4:
+            raise SignfaceError(
+                f"the adaptation needs at least 4 neutral markers, not {len(source)}",
+                hint="choose a neutral frame in which the markers are seen",
+            )
+        if not (np.isfinite(source).all() and np.isfinite(target).all()):
+            missing = np.flatnonzero(~(np.isfinite(source) & np.isfinite(target)).all(axis=1))
+            raise SignfaceError(
+                f"{len(missing)} of {len(source)} neutral markers are missing",
+                hint="choose a neutral frame in which they are seen",
+            )
+        self._centre = source.mean(axis=0)
+        self._size = float(np.sqrt(((source - self._centre) ** 2).sum(axis=1).mean()))
+        if self._size == 0.0:
+            raise SignfaceError("all neutral markers stand on one point", hint="check the neutral frame")
+        self._knots = (source - self._centre) / self._size
+        distance = np.linalg.norm(self._knots[:, None] - self._knots[None], axis=2)
+        close = np.argwhere(np.triu(distance < COINCIDENT, k=1))
+        if len(close):
+            raise SignfaceError(
+                f"neutral markers {close[0, 0] + 1} and {close[0, 1] + 1} stand on one point",
+                hint="drop one of them, or choose another neutral frame",
+            )
+        self._fit(distance, target)
+
+    def _fit(self, distance: np.ndarray, target: np.ndarray) -> None:
+        """Solve eq. 5.19, the affine part first brought to the directions that the markers span."""
+        knots, count = self._knots, len(self._knots)
+        similarity = _similarity(knots, target)
+        _, values, axes = np.linalg.svd(knots, full_matrices=False)
+        spanned = axes[values > FLAT * values[0]]
+        affine = np.column_stack([knots @ spanned.T, np.ones(count)])
+        system = np.zeros((count + affine.shape[1],) * 2)
+        system[:count, :count] = distance**3
+        system[:count, count:] = affine
+        system[count:, :count] = affine.T
+        right = np.zeros((len(system), 3))
+        # The similarity is taken off first and added again: across a plane of markers it is all there is.
+        right[:count] = target - (knots @ similarity[:3] + similarity[3])
+        unknown = np.linalg.solve(system, right)
+        self._radial = unknown[:count]
+        self._linear = similarity[:3] + spanned.T @ unknown[count:-1]
+        self._constant = similarity[3] + unknown[-1]
+
+    def transform(self, points: np.ndarray) -> np.ndarray:
+        """Positions on the avatar.
+
+        Parameters
+        ----------
+        points : (..., 3) array
+            Positions on the signer, for instance (F, P, 3). NaN stays NaN.
+
+        Returns
+        -------
+        (..., 3) array
+        """
+        points = np.asarray(points, dtype=np.float64)
+        flat = points.reshape(-1, 3)
+        result = np.empty_like(flat)
+        step = max(1, FRAMES_AT_A_TIME * 40 // max(1, len(self._knots) // 40))
+        for start in range(0, len(flat), step):
+            local = (flat[start : start + step] - self._centre) / self._size
+            # |m - k|^2 as a product of matrices: r^3 is so flat at 0 that the cancellation there does not show.
+            squared = local @ (-2.0 * self._knots.T)
+            squared += np.einsum("ij,ij->i", local, local)[:, None]
+            squared += np.einsum("ij,ij->i", self._knots, self._knots)
+            np.maximum(squared, 0.0, out=squared)
+            squared *= np.sqrt(squared)
+            result[start : start + step] = squared @ self._radial + local @ self._linear + self._constant
+        return result.reshape(points.shape)
+
+
+def _similarity(knots: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """(4, 3) rows of the best rotation with scale, then the shift: `x @ result[:3] + result[3]` (Umeyama 1991).
+
+    `knots` are centred. The rotation is proper, so that a plane of markers is not turned inside out.
+    """
+    centre = target.mean(axis=0)
+    left, values, right = np.linalg.svd(knots.T @ (target - centre))
+    sign = np.array([1.0, 1.0, np.sign(np.linalg.det(left) * np.linalg.det(right))])
+    scale = float((values * sign).sum() / (knots**2).sum())
+    return np.vstack([scale * (left * sign) @ right, centre])

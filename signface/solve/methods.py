@@ -1,0 +1,51 @@
+"""The mappings from markers to weights, by name."""
+
+from __future__ import annotations
+
+import difflib
+
+from signface.errors import SignfaceError
+from signface.face.layout import MarkerLayout
+from signface.face.model import FaceModel
+from signface.solve.linear import Bounded, LeastSquares, NonNegative
+from signface.solve.solver import Solver
+from signface.solve.thin_shell import ALPHA, ThinShellSolver
+
+#: name: what it is, for `--help` and reports.
+METHODS = {
+    "thin-shell": "least bending and stretching of the skin, soft bounds (the default)",
+    "least-squares": "least squares without bounds",
+    "nnls": "non-negative least squares",
+    "bounded": "least squares with weights from 0 to 1",
+}
+
+
+def make_solver(method: str, face: FaceModel, layout: MarkerLayout, *, alpha: float | None = None) -> Solver:
+    """A solver by name.
+
+    Parameters
+    ----------
+    method : str
+        A key of `METHODS`.
+    face : FaceModel
+    layout : MarkerLayout
+    alpha : float, optional
+        Weight of the thin shell, 0 to 1; only for `thin-shell`.
+
+    Raises
+    ------
+    SignfaceError
+        There is no such method, or it has no alpha.
+    """
+    if method == "thin-shell":
+        return ThinShellSolver(face, layout, alpha=ALPHA if alpha is None else alpha)
+    rivals = {"least-squares": LeastSquares, "nnls": NonNegative, "bounded": Bounded}
+    if method not in rivals:
+        close = difflib.get_close_matches(method, METHODS, n=1)
+        raise SignfaceError(
+            f"no method is called {method!r}",
+            hint=f"did you mean {close[0]}" if close else f"the methods are {', '.join(METHODS)}",
+        )
+    if alpha is not None:
+        raise SignfaceError(f"the method {method} has no alpha", hint="leave --alpha out, or use thin-shell")
+    return rivals[method](face, layout)

@@ -1,0 +1,177 @@
+"""What every mapping from markers to weights shares: the interface, its result, and the face seen by the markers.
+
+- `Solver`: built once from a face and a layout; `.solve(displacements)` gives a `Solution`.
+- `Solution`: weights and residuals of a batch of frames.
+- `MarkerBases`: the bases where the markers stand, and which of them the markers can observe at all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from signface.errors import SignfaceError
+from signface.face.layout import MarkerLayout
+from signface.face.model import FaceModel
+
+#: A base is observed when its root mean square displacement at the markers reaches this share of the median base's.
+#: Below it, the marker noise would have to be read as a full activation.
+OBSERVED_SHARE = 0.02
+
+#: Relative size of a singular value of the marker matrix under which bases count as linearly dependent.
+DEPENDENT = 1e-7
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Weights of a batch of frames.
+
+    Parameters
+    ----------
+    weights : (F, N) float64 array
+        0 at rest, 1 fully active. NaN in a frame without any marker.
+    residual : (F,) float64 array
+        Root mean square distance between the given and the solved markers, over the markers present, in the
+        displacements' unit (millimetres in signface). NaN in a frame without any marker.
+    """
+
+    weights: np.ndarray
+    residual: np.ndarray
+
+
+class Solver(Protocol):
+    """Markers to weights. Everything that does not depend on the frame is computed by the constructor."""
+
+    names: tuple[str, ...]
+
+    def solve(self, displacements: np.ndarray) -> Solution:
+        """Weights of each frame.
+
+        Parameters
+        ----------
+        displacements : (F, P, 3) array
+            Displacement of each face marker of the layout from its neutral place (eq. 5.21), in the face's unit;
+            NaN where a marker is missing.
+        """
+        ...
+
+
+class MarkerBases:
+    """The bases at the markers (eq. 5.22), with the checks that every solver needs.
+
+    Parameters
+    ----------
+    face : FaceModel
+    layout : MarkerLayout
+        Its P face markers are used.
+
+    Attributes
+    ----------
+    matrix : (3P, N) array
+        Displacement of each marker coordinate (marker by marker, x y z) by each base, in the face's unit.
+    observed : (N,) bool array
+        The bases that the markers can see. The others are left at weight 0: an eye rotation moves no skin.
+    scale : float
+        Mean over the observed bases of their summed squared displacement at the markers (unit squared): what one
+        typical base, fully active, does to the markers.
+
+    Raises
+    ------
+    SignfaceError
+        There are too few markers, no base is observed, or observed bases are linearly dependent at the markers.
+    """
+
+    def __init__(self, face: FaceModel, layout: MarkerLayout) -> None:
+        bases = layout.bases(face)
+        self.names = face.names
+        self.face_name = face.name
+        self.labels = layout.face_labels
+        self.n_markers = bases.shape[1]
+        if self.n_markers < 4:
+            raise SignfaceError(
+                f"the layout {layout.name} has {self.n_markers} face markers, and at least 4 are needed",
+                hint="use a layout with more face markers",
+            )
+        self.matrix = bases.reshape(len(bases), -1).T.copy()
+        energy = np.einsum("ij,ij->j", self.matrix, self.matrix)
+        if not energy.any():
+            raise SignfaceError(
+                f"no base of {face.name} moves a marker of the layout {layout.name}",
+                hint="use a layout made for this face",
+            )
+        typical = np.median(energy[energy > 1e-12 * energy.max()])
+        self.observed = energy > OBSERVED_SHARE**2 * typical
+        self.scale = float(energy[self.observed].mean())
+        self._check_independent(layout)
+
+    def _check_independent(self, layout: MarkerLayout) -> None:
+        """Raise when observed bases are linearly dependent at the markers, naming them."""
+        columns = self.matrix[:, self.observed]
+        names = np.array(self.names)[self.observed]
+        if 3 * self.n_markers < columns.shape[1]:
+            raise SignfaceError(
+                f"{self.n_markers} face markers of the layout {layout.name} (3 coordinates each) cannot tell apart"
+                f" the {columns.shape[1]} bases of {self.face_name} that move them",
+                hint=f"use at least {-(-columns.shape[1] // 3)} face markers",
+            )
+        _, values, rows = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
+        null = rows[values < DEPENDENT * values[0]]
+        if len(null):
+            share = np.abs(null).max(axis=0)
+            involved = names[share > 0.05 * share.max()]
+            listed = ", ".join(involved[:8]) + (f" and {len(involved) - 8} more" if len(involved) > 8 else "")
+            raise SignfaceError(
+                f"bases of {self.face_name} are linearly dependent at the markers of the layout {layout.name}:"
+                f" {listed}",
+                hint="drop one of them from the face, or add markers that tell them apart",
+            )
+
+    def checked(self, displacements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The displacements as (F, 3P) rows with 0 for missing markers, and the (F, P) bool array of present ones.
+
+        Raises
+        ------
+        SignfaceError
+            The shape does not fit the layout.
+        """
+        displacements = np.asarray(displacements, dtype=np.float64)
+        if displacements.ndim != 3 or displacements.shape[1:] != (self.n_markers, 3):
+            raise SignfaceError(
+                f"displacements must have the shape (frames, {self.n_markers}, 3), not {displacements.shape}"
+            )
+        present = np.isfinite(displacements).all(axis=2)
+        if not present.all():
+            displacements = np.where(present[:, :, None], displacements, 0.0)
+        return displacements.reshape(len(displacements), -1), present
+
+    def solution(self, weights: np.ndarray, rows: np.ndarray, present: np.ndarray) -> Solution:
+        """The `Solution` of solved weights: the residual over the markers present, NaN where there is none."""
+        error = (weights @ self.matrix.T - rows).reshape(len(rows), self.n_markers, 3)
+        squared = np.einsum("fpd,fpd->fp", error, error)
+        count = present.sum(axis=1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            residual = np.sqrt((squared * present).sum(axis=1) / count)
+        return Solution(np.where(count[:, None] > 0, weights, np.nan), residual)
+
+
+def presence_patterns(present: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Frames grouped by which markers they have.
+
+    Parameters
+    ----------
+    present : (F, P) bool array
+
+    Returns
+    -------
+    list of ((P,) bool array, (k,) int array)
+        Each pattern of present markers with the frames that show it; the frames without any marker are left out.
+    """
+    if present.all():
+        return [(np.ones(present.shape[1], dtype=bool), np.arange(len(present)))]
+    packed = np.packbits(present, axis=1)
+    _, first, inverse = np.unique(packed, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(inverse.ravel(), kind="stable")
+    groups = np.split(order, np.cumsum(np.bincount(inverse.ravel()))[:-1])
+    return [(present[start], frames) for start, frames in zip(first, groups) if present[start].any()]
