@@ -61,6 +61,13 @@ def test_frames_with_few_markers_are_not_neutral():
     assert not 9.0 <= found < 12.0
 
 
+def test_frames_that_lack_a_head_marker_are_not_neutral_while_others_show_them_all():
+    take = with_gaps(expressions(RESTS), {22: (800, 1300)})
+    found = find_neutral(take, head=HEAD)
+    assert not 8.0 <= found < 13.0
+    assert any(begin <= found <= end for begin, end in RESTS)
+
+
 def test_a_take_of_one_frame_is_its_own_neutral():
     take, _ = moving_face(1.0, 50.0)
     assert find_neutral(Take(take.positions[:1], take.labels, 50.0, start=4.0)) == 4.0

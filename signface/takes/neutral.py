@@ -76,7 +76,8 @@ def find_neutral(take: Take, labels: Sequence[str] | None = None, *, head: Seque
     positions = take.select(names)
     carried = take.select(carriers) if len(carriers) >= 3 else positions
     seen = np.isfinite(positions[..., 0])
-    usable = (seen.sum(axis=1) >= min(3, len(names))) & (np.isfinite(carried[..., 0]).sum(axis=1) >= 3)
+    carrying = np.isfinite(carried[..., 0]).sum(axis=1)
+    usable = (seen.sum(axis=1) >= min(3, len(names))) & (carrying >= 3)
     if not usable.any():
         raise SignfaceError("no frame shows three markers", file=take.name, hint="give the neutral time in seconds")
     with warnings.catch_warnings():
@@ -88,7 +89,9 @@ def find_neutral(take: Take, labels: Sequence[str] | None = None, *, head: Seque
             return take.start
         steps = np.sqrt(np.nanmean(np.sum(np.diff(still_head, axis=0) ** 2, axis=2), axis=1)) * take.rate
     share = seen.mean(axis=1)
-    away[~usable | (share < 0.8 * share.max())] = np.nan  # a neutral frame shows nearly all that can be seen
+    # A neutral frame shows nearly all that can be seen, and all head markers: the others are measured against it.
+    least = carrying[usable].max() if len(carriers) >= 3 else 3
+    away[~usable | (share < 0.8 * share.max()) | (carrying < least)] = np.nan
     speed = _rolling_mean(np.append(steps, steps[-1]), max(1, round(SMOOTHING_S * take.rate)))
     known = np.isfinite(speed) & np.isfinite(away)
     if not known.any():

@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import csv
 import struct
 from os import PathLike
 from pathlib import Path
@@ -68,7 +69,7 @@ def _recognise_text(opening: bytes) -> str | None:
 
     try:
         cells, _ = header_cells(first)
-    except Exception:  # csv.Error: a cell too long to be a header
+    except csv.Error:  # too long a cell to be a header
         return None
     if [cell.lower() for cell in cells[:2]] == ["timecode", "blendshapecount"]:
         return "livelink"
@@ -94,7 +95,7 @@ def recognise(path: str | PathLike[str]) -> str:
         return "weights"
     if len(opening) >= 10:
         (version,) = struct.unpack("<f", opening[:4])
-        if version == 0 or round(version, 3) in (0.1, 0.2):
+        if round(version, 3) in (0.1, 0.2) or (version == 0 and file.suffix.lower() == ".pose"):
             return "pose"
     found = _recognise_text(opening)
     if found is not None:

@@ -42,9 +42,10 @@ def read_text(file: Path) -> str:
 
 
 def numbers(lines: Sequence[str], columns: int, separator: str, file: Path, first_line: int = 1) -> np.ndarray:
-    """Lines of cells to a (rows, columns) float64 array; an empty or unreadable cell is NaN.
+    """Lines of cells to a (rows, columns) float64 array; an empty cell is NaN.
 
-    Cells beyond `columns` are left out when they are empty in every row (a separator at the end of lines).
+    Cells beyond `columns` are left out (many exporters end their lines with a separator). Numbers have a decimal point,
+    or a decimal comma where the separator is another sign.
 
     Parameters
     ----------
@@ -73,7 +74,8 @@ def numbers(lines: Sequence[str], columns: int, separator: str, file: Path, firs
             raise SignfaceError(
                 f"line {number} has {cells} cells instead of {columns}", file=file, hint="the file may be cut short"
             )
-    decimal = "," if separator != "," and "," in kept[0][1] and "." not in kept[0][1] else "."
+    beginning = "".join(line for _, line in kept[:50])
+    decimal = "," if separator != "," and "," in beginning and "." not in beginning else "."
     try:
         table = pd.read_csv(
             io.StringIO("\n".join(line for _, line in kept)),
@@ -81,7 +83,6 @@ def numbers(lines: Sequence[str], columns: int, separator: str, file: Path, firs
             header=None,
             usecols=range(columns),
             names=range(max(line.count(separator) for _, line in kept) + 1),
-            dtype=str if columns < 1 else None,
             decimal=decimal,
             skipinitialspace=True,
             quoting=3,
