@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from signface.face.layout_files import read_layout
 
 from signface.corpus.synthesis import Job, make_plan, make_signer, make_take
 from signface.corpus.synthetic_expressions import (
@@ -17,9 +16,9 @@ from signface.corpus.synthetic_expressions import (
     draw_habits,
 )
 from signface.corpus.synthetic_heads import SHAPE_RMS_MM, local_maps
-from signface.corpus.synthetic_markers import closest_on_triangles
 from signface.corpus.synthetic_motion import minimum_jerk, pulse, saturate, smooth_noise
 from signface.corpus.synthetic_performance import perform
+from signface.face.layout_files import read_layout
 from signface.face.reading import read_face
 
 
@@ -197,15 +196,3 @@ def test_noise_is_as_strong_and_as_slow_as_asked():
         power[(frequency > 0.45) & (frequency < 0.55)].mean(),
     )
     assert 0.4 < half / low < 0.6
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.lists(st.floats(-5, 5), min_size=12, max_size=12))
-def test_the_closest_point_of_a_triangle_is_closer_than_any_other(numbers):
-    values = np.array(numbers).reshape(4, 3)
-    triangle = values[1:] + np.eye(3)  # never quite degenerate for the values drawn most
-    weights, point = closest_on_triangles(values[0], triangle[None])
-    assert weights.min() >= -1e-9
-    np.testing.assert_allclose(weights.sum(), 1.0, atol=1e-9)
-    others = np.random.default_rng(0).dirichlet(np.ones(3), 200) @ triangle
-    assert np.linalg.norm(point[0] - values[0]) <= np.linalg.norm(others - values[0], axis=1).min() + 1e-6

@@ -24,8 +24,9 @@ from signface.face.model import FaceModel
 
 #: Root mean square distance of a signer's face from the avatar's, millimetres: least and greatest.
 SHAPE_RMS_MM = (4.0, 6.0)
-#: Where the jaw turns, on the default face: the axis through both joints, before the ears (x is free; y, z in mm).
-HINGE_YZ_MM = (0.0, 5.0)
+#: Where the jaw turns, on the default face: the axis through both joints, just before the ears (y and z, mm). The
+#: rotation that fits `jawOpen` best turns about y = -2, z = 18.
+HINGE_YZ_MM = (0.0, 15.0)
 #: Bases that move the lower jaw about its hinge.
 JAW = "jawOpen"
 
@@ -215,7 +216,7 @@ def local_maps(mesh: Mesh, shape: np.ndarray, rings: int = 4) -> np.ndarray:
     crossed = gather @ (after[:, :, None] * before[:, None, :]).reshape(-1, 9)
     lengths = gather @ (before**2).sum(axis=1)
     stretch = np.sqrt((gather @ (after**2).sum(axis=1)) / lengths)
-    old, new = vertex_normals(mesh), vertex_normals(Mesh(shape, mesh.triangles))
+    old, new = mesh.vertex_normals, Mesh(shape, mesh.triangles).vertex_normals
     moments += (lengths[:, None, None] * old[:, :, None] * old[:, None, :]).reshape(-1, 9)
     crossed += ((lengths * stretch)[:, None, None] * new[:, :, None] * old[:, None, :]).reshape(-1, 9)
     average = sparse.csr_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), (count, count)) + sparse.eye(count)
@@ -223,15 +224,6 @@ def local_maps(mesh: Mesh, shape: np.ndarray, rings: int = 4) -> np.ndarray:
     for _ in range(rings):
         moments, crossed = average @ moments, average @ crossed
     return crossed.reshape(-1, 3, 3) @ np.linalg.inv(moments.reshape(-1, 3, 3))
-
-
-def vertex_normals(mesh: Mesh) -> np.ndarray:
-    """(V, 3) unit normals, the mean of the triangles' weighted by area."""
-    total = np.zeros_like(mesh.vertices)
-    normals = mesh.triangle_normals
-    for corner in range(3):
-        np.add.at(total, mesh.triangles[:, corner], normals)
-    return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
 
 
 def smooth_field(points: np.ndarray, rng: np.random.Generator, *, spread_mm: float, waves: int = 24) -> np.ndarray:

@@ -18,11 +18,12 @@ from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial.transform import Rotation
 
-from signface.corpus.synthetic_heads import Head, vertex_normals
+from signface.corpus.synthetic_heads import Head
 from signface.corpus.synthetic_motion import smooth_noise
 from signface.corpus.synthetic_protocol import Plan
 from signface.corpus.synthetic_signing import GRAMMAR, head_gestures
 from signface.face.layout import MarkerLayout
+from signface.face.layout_files import nearest_points
 from signface.face.mesh import Mesh
 
 #: How far from the layout's point a marker is glued, along the skin.
@@ -62,7 +63,7 @@ def glue_markers(head: Head, layout: MarkerLayout, rng: np.random.Generator) -> 
     """Put the markers of a layout on a head, each 1 to 3 mm from its point along the skin."""
     mesh = head.face.mesh
     wanted = layout.interpolate(mesh.vertices, layout.labels)
-    normals = vertex_normals(mesh)
+    normals = mesh.vertex_normals
     distances = _walks(mesh, layout.corners[:, 0], limit=14.0)
     corners, barycentric = [], []
     for point, corner, weights, distance in zip(wanted, layout.corners, layout.barycentric, distances):
@@ -75,10 +76,9 @@ def glue_markers(head: Head, layout: MarkerLayout, rng: np.random.Generator) -> 
         facing = mesh.triangle_normals @ normal > 0.3 * np.linalg.norm(mesh.triangle_normals, axis=1)
         touching = (mesh.triangles == corner[0]).any(axis=1)
         near = np.flatnonzero(touching | (facing & np.isfinite(distance[mesh.triangles]).all(axis=1)))
-        weights, closest = closest_on_triangles(point + aside, mesh.vertices[mesh.triangles[near]])
-        best = np.argmin(np.linalg.norm(closest - (point + aside), axis=1))
-        corners.append(mesh.triangles[near[best]])
-        barycentric.append(weights[best])
+        corner, weights, _ = nearest_points(Mesh(mesh.vertices, mesh.triangles[near]), (point + aside)[None])
+        corners.append(corner[0])
+        barycentric.append(weights[0])
     jitter = rng.uniform(*JITTER_MM, len(layout.labels))
     return Glued(layout.labels, np.array(corners), np.array(barycentric), jitter)
 
@@ -93,48 +93,6 @@ def _walks(mesh: Mesh, sources: np.ndarray, limit: float) -> np.ndarray:
     return dijkstra(graph, directed=False, indices=sources, limit=limit)
 
 
-def closest_on_triangles(point: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Point of each triangle that is closest to a point.
-
-    Parameters
-    ----------
-    point : (3,) array
-    triangles : (T, 3, 3) array
-
-    Returns
-    -------
-    (T, 3) array
-        Barycentric weights.
-    (T, 3) array
-        The points.
-    """
-    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
-    inside = _plane_weights(point, a, b, c)
-    candidates = [np.where((inside >= 0).all(axis=1, keepdims=True), inside, np.nan)]
-    for first, second in ((0, 1), (1, 2), (2, 0)):
-        start, way = triangles[:, first], triangles[:, second] - triangles[:, first]
-        along = np.clip(((point - start) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-12), 0.0, 1.0)
-        edge = np.zeros((len(triangles), 3))
-        edge[:, first], edge[:, second] = 1.0 - along, along
-        candidates.append(edge)
-    weights = np.stack(candidates)
-    points = np.einsum("ktc,tcd->ktd", weights, triangles)
-    distance = np.linalg.norm(points - point, axis=2)
-    best = np.nanargmin(distance, axis=0)
-    rows = np.arange(len(triangles))
-    return weights[best, rows], points[best, rows]
-
-
-def _plane_weights(point: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """(T, 3) barycentric weights of the point's foot on each triangle's plane."""
-    u, v, w = b - a, c - a, point - a
-    uu, uv, vv = (u * u).sum(axis=1), (u * v).sum(axis=1), (v * v).sum(axis=1)
-    wu, wv = (w * u).sum(axis=1), (w * v).sum(axis=1)
-    determinant = np.maximum(uu * vv - uv**2, 1e-12)
-    second, third = (vv * wu - uv * wv) / determinant, (uu * wv - uv * wu) / determinant
-    return np.stack([1.0 - second - third, second, third], axis=1)
-
-
 def head_motion(plan: Plan, time: np.ndarray, rate: float, rng: np.random.Generator) -> np.ndarray:
     """(F, 4, 4) pose of the head in the room, Z up, as it sways and makes the gestures of its clauses.
 
@@ -143,7 +101,7 @@ def head_motion(plan: Plan, time: np.ndarray, rate: float, rng: np.random.Genera
     signing = len(plan.clauses) > 0
     sway_degrees, sway_mm = (3.5, 12.0) if signing else (1.2, 4.0)
     turn = np.radians(sway_degrees) * smooth_noise(rng, len(time), rate, 0.35, 3)
-    move = sway_mm * smooth_noise(rng, len(time), rate, 0.25, 3)
+    move = sway_mm * smooth_noise(rng, len(time), rate, 0.25, 3) * (1.0, 0.4, 0.8)  # people sway less up and down
     for clause in plan.clauses:
         for marking, start, end in clause.markings:
             gesture_turn, gesture_move = head_gestures(time, GRAMMAR[marking].gesture, start, end, rng)

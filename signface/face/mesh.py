@@ -55,3 +55,11 @@ class Mesh:
     def triangle_areas(self) -> np.ndarray:
         """(T,) areas in square millimetres."""
         return 0.5 * np.linalg.norm(self.triangle_normals, axis=1)
+
+    @property
+    def vertex_normals(self) -> np.ndarray:
+        """(V, 3) unit normals, the mean of the triangles' around each vertex, weighted by area."""
+        total = np.zeros_like(self.vertices)
+        for corner in range(3):
+            np.add.at(total, self.triangles[:, corner], self.triangle_normals)
+        return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
