@@ -23,7 +23,7 @@ def one_base(values: np.ndarray, rate: float) -> Descriptors:
 def test_velocity_of_a_ramp_is_its_slope(rate):
     time = np.arange(2 * rate) / rate
     curves = energies(one_base(0.7 * time, rate))
-    inside = (curves.time > 0.2) & (curves.time < 1.7)
+    inside = (curves.time > 0.45) & (curves.time < 1.5)
     np.testing.assert_allclose(curves.velocity[inside], 0.7, rtol=1e-9)
     np.testing.assert_allclose(curves.acceleration[inside], 0, atol=1e-9)
 
@@ -32,7 +32,7 @@ def test_velocity_of_a_ramp_is_its_slope(rate):
 def test_acceleration_of_a_parabola_is_constant(rate):
     time = np.arange(2 * rate) / rate
     curves = energies(one_base(0.5 * 0.3 * time**2, rate))
-    inside = (curves.time > 0.2) & (curves.time < 1.7)
+    inside = (curves.time > 0.45) & (curves.time < 1.5)
     np.testing.assert_allclose(curves.acceleration[inside], 0.3, rtol=1e-6)
 
 
@@ -118,3 +118,16 @@ def test_two_frames_are_too_few(frames):
 def test_a_take_without_weights_is_named():
     with pytest.raises(SignfaceError, match="no frame has weights"):
         energies(one_base(np.full(50, np.nan), 200))
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_a_blink_leaves_no_energy_and_a_step_keeps_its_own(rate):
+    time = np.arange(3 * rate) / rate
+    blink = np.exp(-(((time - 1.5) / 0.06) ** 2))
+    step = np.clip((time - 1.3) / 0.4, 0, 1)
+    assert (
+        energies(one_base(blink, rate)).activity.max()
+        < 0.02 * energies(one_base(blink, rate), pulse_s=0).activity.max()
+    )
+    kept, all_of_it = energies(one_base(step, rate)), energies(one_base(step, rate), pulse_s=0)
+    np.testing.assert_allclose(kept.activity, all_of_it.activity, atol=0.02)

@@ -11,7 +11,7 @@ from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.segment.segmentation import segment
 from signface.segment.segments import Segments
-from tests.hand_made import moving_face
+from tests.hand_made import eased, moving_face
 
 FACE = np.array([0.8, 0.5, 0.0, 0.3, 0.0, 0.6])
 OTHER = np.array([0.0, 0.7, 0.9, 0.0, 0.4, 0.0])
@@ -38,7 +38,9 @@ def test_transitions_are_found_where_the_face_moves(duration, noise):
     take, moves = moving_face([REST, FACE, OTHER, REST], rate=200, duration=duration, noise=noise)
     found = moves_of(segment(take))
     assert found.shape == (3, 2)
-    np.testing.assert_allclose(found, moves, atol=0.08)
+    np.testing.assert_allclose(found.mean(axis=1), np.mean(moves, axis=1), atol=0.03)
+    assert (found[:, 0] > np.array(moves)[:, 0] - 0.03).all()
+    assert (np.diff(found) > 0.6 * duration).all()  # the first and last tenth of the way are not seen
 
 
 @settings(deadline=None, max_examples=30)
@@ -106,11 +108,13 @@ def test_a_movement_that_stands_out_of_jitter_is_found():
     np.testing.assert_allclose(moves_of(segment(take)), moves, atol=0.1)
 
 
-def test_a_quick_return_is_one_transition():
-    take, moves = moving_face([REST, FACE, REST], rate=200, hold=1.0, duration=0.2)
-    brief = np.concatenate([take.weights[:240], take.weights[400:]])  # the face is held for a moment only
-    assert len(moves) == 2
-    assert segment(Descriptors(brief, take.names, 200)).table.kind.tolist() == ["stable", "transition", "stable"]
+@pytest.mark.parametrize("rate", [30, 60, 200])
+@pytest.mark.parametrize(("hold", "kinds"), [(0.0, 1), (0.6, 5)])
+def test_what_is_back_at_once_is_a_blink_and_what_stays_is_an_expression(rate, hold, kinds):
+    """There and back within 0.3 s is a blink; the same held for a while is cut."""
+    time = np.arange(3 * rate) / rate
+    lids = eased(time, 1.0, 0.15) - eased(time, 1.15 + hold, 0.15)
+    assert len(segment(Descriptors(np.column_stack([lids, lids]), ("left", "right"), rate))) == kinds
 
 
 def test_a_movement_that_the_recording_cuts_off_reaches_its_end():
@@ -134,7 +138,7 @@ def test_a_recording_in_half_scale_has_the_same_segments():
 
 def test_history_says_how_the_take_was_cut():
     take, _ = moving_face([REST, FACE], rate=100)
-    assert "segment prominence=0.25" in segment(take).history[-1]
+    assert "segment prominence=0.15" in segment(take).history[-1]
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import median_filter
 from scipy.signal import savgol_filter
 
 from signface.descriptors import Descriptors
@@ -51,7 +52,9 @@ class Energies:
         return np.sqrt(self.combined)
 
 
-def energies(descriptors: Descriptors, *, window_s: float = 0.23, time_constant_s: float = 0.15) -> Energies:
+def energies(
+    descriptors: Descriptors, *, window_s: float = 0.23, time_constant_s: float = 0.15, pulse_s: float = 0.3
+) -> Energies:
     """Velocity and acceleration energies of the weights of a take (thesis 4.4.2, eq. 4.4 and 4.5).
 
     The derivatives are those of a parabola fitted to the weights in a sliding window (Savitzky-Golay). The window is
@@ -66,6 +69,10 @@ def energies(descriptors: Descriptors, *, window_s: float = 0.23, time_constant_
     or three. 0.15 s belongs to transitions of about half a second. A constant time, rather than a level of each take,
     leaves the curve of a moment independent of the rest of its take.
 
+    Blinks and mouthed syllables are faster than any change of expression, and their acceleration would be all that
+    the curves show. What is back where it began within `pulse_s` is therefore taken out first, by a running median
+    of each base, which leaves a movement that stays untouched.
+
     Parameters
     ----------
     descriptors : Descriptors
@@ -74,6 +81,8 @@ def energies(descriptors: Descriptors, *, window_s: float = 0.23, time_constant_
         Width of the sliding window in seconds. A take shorter than it is differentiated with a shorter one.
     time_constant_s : float
         See above, in seconds.
+    pulse_s : float
+        The longest movement and return that is taken out, in seconds; 0 leaves everything.
 
     Returns
     -------
@@ -99,12 +108,13 @@ def energies(descriptors: Descriptors, *, window_s: float = 0.23, time_constant_
             f"{descriptors.name}: {descriptors.n_frames} frames are too few for an energy curve",
             hint="a rate of change needs three frames",
         )
-    if window_s <= 0 or time_constant_s <= 0:
+    if window_s <= 0 or time_constant_s <= 0 or pulse_s < 0:
         raise SignfaceError("the window and the time constant of the energies must be positive seconds")
     weights = bridged(descriptors)
     factor = max(1, int(np.ceil(FINE_RATE / descriptors.rate)))
     time, weights = _refined(descriptors.time, weights, factor)
     rate = descriptors.rate * factor
+    weights = _without_pulses(weights, pulse_s, rate)
     window = _window_frames(window_s, rate, len(time))
     derivative = {
         order: savgol_filter(weights, window, polyorder=2, deriv=order, delta=1 / rate, axis=0, mode="mirror")
@@ -148,6 +158,12 @@ def _refined(time: np.ndarray, weights: np.ndarray, factor: int) -> tuple[np.nda
 
     fine = np.linspace(time[0], time[-1], factor * (len(time) - 1) + 1)
     return fine, make_interp_spline(time, weights, k=min(3, len(time) - 1), axis=0)(fine)
+
+
+def _without_pulses(weights: np.ndarray, pulse_s: float, rate: float) -> np.ndarray:
+    """Weights without movements that are back where they began within `pulse_s`: a running median of twice that."""
+    half = round(pulse_s * rate)
+    return median_filter(weights, size=(2 * half + 1, 1), mode="mirror") if half else weights
 
 
 def _window_frames(window_s: float, rate: float, frames: int) -> int:

@@ -20,14 +20,15 @@ from signface.segment.segments import Segments
 def segment(
     descriptors: Descriptors,
     *,
-    prominence: float = 0.25,
+    prominence: float = 0.15,
     least_activity: float = 0.5,
     noise_factor: float = 8.0,
-    extent: float = 0.25,
+    extent: float = 0.5,
     least_stable_s: float = 0.15,
     least_transition_s: float = 0.08,
     window_s: float = 0.23,
     time_constant_s: float = 0.15,
+    pulse_s: float = 0.3,
 ) -> Segments:
     """Cut a take into stable segments and the transitions between them.
 
@@ -52,13 +53,13 @@ def segment(
     noise_factor : float
         Least prominence of a peak, in standard deviations of the take's noise.
     extent : float
-        A transition ends where the activity has fallen to this fraction of its peak above the floor. 0.25 puts the
-        ends of a smooth movement of 0.3 to 0.8 s within some 30 ms of where it starts and stops.
+        A transition ends where the activity has fallen to this fraction of its peak above the floor. Half the
+        height leaves out the first and last tenth of an eased movement, which the eye does not see either.
     least_stable_s : float
         Transitions with less than this between them are merged (s).
     least_transition_s : float
         Shorter transitions are jolts, not movements of a face, and are left in their stable segment (s).
-    window_s, time_constant_s : float
+    window_s, time_constant_s, pulse_s : float
         See `energies`.
 
     Returns
@@ -92,7 +93,7 @@ def segment(
     begin, end = descriptors.start, descriptors.start + descriptors.duration
     transitions: list[tuple[float, float]] = []
     if descriptors.n_frames >= 3 and descriptors.duration > 2 * least_transition_s:
-        curves = energies(descriptors, window_s=window_s, time_constant_s=time_constant_s)
+        curves = energies(descriptors, window_s=window_s, time_constant_s=time_constant_s, pulse_s=pulse_s)
         threshold, floor = _threshold(curves.activity, prominence, least_activity, noise_factor)
         transitions = _around_peaks(curves, threshold, floor, extent)
         transitions = _merged(transitions, least_stable_s, curves.time[0], curves.time[-1], end)
