@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.segment.energy import FINE_RATE, bridged, energies
-from tests.hand_made import moving_face
+from tests.hand_made import eased, moving_face
 
 RATES = (30, 60, 120, 200)
 
@@ -124,7 +124,7 @@ def test_a_take_without_weights_is_named():
 def test_a_blink_leaves_no_energy_and_a_step_keeps_its_own(rate):
     time = np.arange(3 * rate) / rate
     blink = np.exp(-(((time - 1.5) / 0.06) ** 2))
-    step = np.clip((time - 1.3) / 0.4, 0, 1)
+    step = eased(time, 1.3, 0.4)
     assert (
         energies(one_base(blink, rate)).activity.max()
         < 0.02 * energies(one_base(blink, rate), pulse_s=0).activity.max()
