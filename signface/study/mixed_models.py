@@ -177,7 +177,7 @@ class OrdinalMixedModel:
         value = curves.log.sum() - 0.5 * modes @ modes - np.log(np.diag(factor)).sum()
 
         # The gradient has three parts: the answers' own, that of ½log|H| at a fixed mode, and that of ½log|H| through
-        # the mode. `leverage` is z_i'H⁻¹z_i of each answer; `along` carries a change of the modes to a change of ½log|H|.
+        # the mode. `leverage` is z_i'H⁻¹z_i of each answer; `along` carries a change of modes to a change of ½log|H|.
         inverse = np.linalg.inv(hessian)
         spread_inverse = scale[:, None] * inverse * scale
         leverage = np.zeros(len(base))
