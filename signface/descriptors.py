@@ -156,7 +156,9 @@ def read_weights(path: str | PathLike[str]) -> Descriptors:
     if not file.is_file():
         raise SignfaceError("no such file", file=file)
     try:
-        table = pd.read_parquet(file) if file.suffix.lower() == ".parquet" else pd.read_csv(file)
+        with file.open("rb") as stream:
+            parquet = stream.read(4) == b"PAR1"
+        table = pd.read_parquet(file) if parquet else pd.read_csv(file)
     except Exception as error:  # a damaged Parquet file brings errors of every kind out of pyarrow
         raise SignfaceError("cannot be read as a table of weights", file=file) from error
     if not is_weights_table([str(column) for column in table.columns]):

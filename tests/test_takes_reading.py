@@ -363,11 +363,12 @@ def test_the_rate_of_a_live_link_recording_comes_from_its_timecode(rate, tmp_pat
 
 def test_a_weights_file_is_recognised_under_any_ending(tmp_path):
     weights = Descriptors(np.random.default_rng(0).random((5, 3)), ("a_x", "b", "c_z"), 50.0, start=2.0)
-    write_weights(weights, tmp_path / "w.csv")
-    (tmp_path / "w.txt").write_bytes((tmp_path / "w.csv").read_bytes())
-    back = read_recording(tmp_path / "w.txt")
-    assert isinstance(back, Descriptors)
-    assert back.names == weights.names
-    assert back.start == 2.0
+    for name in ("w.csv", "w.parquet"):
+        write_weights(weights, tmp_path / name)
+        (tmp_path / "w.txt").write_bytes((tmp_path / name).read_bytes())
+        back = read_recording(tmp_path / "w.txt")
+        assert isinstance(back, Descriptors)
+        assert back.names == weights.names
+        assert back.start == 2.0
     with pytest.raises(SignfaceError, match="holds weights, not markers"):
         read_take(tmp_path / "w.csv")

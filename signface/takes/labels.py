@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from signface.errors import SignfaceError
 from signface.takes.take import Take
@@ -32,7 +31,7 @@ def _folded(label: str) -> str:
     return re.sub(r"[\s_.\-]+", "", stripped(label)).casefold()
 
 
-def clean_labels(labels: Iterable[str]) -> tuple[list[int], list[str], list[str]]:
+def clean_labels(labels: Sequence[str]) -> tuple[list[int], list[str], list[str]]:
     """Which points of a file are markers, under which unique names.
 
     Unlabelled points (`*12`) are left out. A repeated label gets a number (`LBRO`, `LBRO~2`): which of the two is
@@ -43,29 +42,25 @@ def clean_labels(labels: Iterable[str]) -> tuple[list[int], list[str], list[str]
     (list of int, list of str, list of str)
         Indices of the points kept, their labels, and notes for the take's history.
     """
-    kept, names, notes = [], [], []
-    unlabelled, seen = 0, Counter[str]()
-    taken = {str(label).strip() for label in labels} if not isinstance(labels, list) else {x.strip() for x in labels}
-    repeated = []
-    for index, label in enumerate(labels):
-        name = str(label).strip()
-        if UNLABELLED.match(stripped(name)):
-            unlabelled += 1
-            continue
-        seen[name] += 1
-        if seen[name] > 1:
-            repeated.append(name)
-            number = seen[name]
+    bare = [label.strip() for label in labels]
+    kept = [index for index, name in enumerate(bare) if not UNLABELLED.match(stripped(name))]
+    names: list[str] = []
+    taken, repeated = set(bare), set()
+    for index in kept:
+        name, number = bare[index], 2
+        if name in names:
+            repeated.add(name)
             while f"{name}~{number}" in taken:
                 number += 1
             name = f"{name}~{number}"
             taken.add(name)
-        kept.append(index)
         names.append(name)
-    if unlabelled:
+    notes = []
+    if len(kept) < len(bare):
+        unlabelled = len(bare) - len(kept)
         notes.append(f"ignored {unlabelled} unlabelled point{'s' * (unlabelled > 1)}")
     if repeated:
-        notes.append(f"numbered repeated labels: {', '.join(sorted(set(repeated))[:5])}")
+        notes.append(f"numbered repeated labels: {', '.join(sorted(repeated)[:5])}")
     return kept, names, notes
 
 
