@@ -78,8 +78,8 @@ A {card.classifier} (scikit-learn, {card.frames} training frames, seed {card.see
 
 **It has met no real signer.** It was trained on a synthetic corpus made by `signface synth`, in which no person is
 recorded: {len(card.takes)} takes of the kinds {" and ".join(card.kinds)} by {len(card.signers)} invented signers, on
-the face `{card.face}` with the markers of `{card.layout}`. On recordings of people, take its labels as a first guess to be
-corrected, and train your own from your corrections: `signface train CORPUS -o MODEL`.
+the face `{card.face}` with the markers of `{card.layout}`. On recordings of people, take its labels as a first guess
+to be corrected, and train your own from your corrections: `signface train CORPUS -o MODEL`.
 
 It labels the expressions {", ".join(f"{label} ({AFFECTS[label]})" for label in AFFECTS if label in card.labels)}.
 
