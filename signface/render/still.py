@@ -57,14 +57,6 @@ class Camera:
         return np.stack([column, row, seen[..., 2]], axis=-1)
 
 
-def vertex_normals(mesh: Mesh) -> np.ndarray:
-    """(V, 3) unit normals, area-weighted means of the triangles around each vertex."""
-    normals = np.zeros_like(mesh.vertices)
-    for corner in range(3):
-        np.add.at(normals, mesh.triangles[:, corner], mesh.triangle_normals)
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-
-
 def fragments(corners: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What each pixel shows: (G,) pixel, (G,) triangle and (G, 3) barycentric weights of the nearest fragments.
 
@@ -134,7 +126,7 @@ def render(mesh: Mesh, camera: Camera, colours: np.ndarray, background: float = 
     projected = camera.project(mesh.vertices) * (samples, samples, 1.0)
     pixel, triangle, weight = fragments(projected[mesh.triangles], width, height)
     corners = mesh.triangles[triangle]
-    normal = np.einsum("gk,gkd->gd", weight, vertex_normals(mesh)[corners]) @ camera.axes.T
+    normal = np.einsum("gk,gkd->gd", weight, mesh.vertex_normals[corners]) @ camera.axes.T
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     normal *= np.where(normal[:, 2:] < 0, -1.0, 1.0)  # the inside of an open mesh is lit like its outside
     light = np.full(len(normal), 0.30)
