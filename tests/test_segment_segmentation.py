@@ -40,7 +40,7 @@ def test_transitions_are_found_where_the_face_moves(duration, noise):
     assert found.shape == (3, 2)
     np.testing.assert_allclose(found.mean(axis=1), np.mean(moves, axis=1), atol=0.03)
     assert (found[:, 0] > np.array(moves)[:, 0] - 0.03).all()
-    assert (np.diff(found) > 0.6 * duration).all()  # the first and last tenth of the way are not seen
+    assert (np.diff(found) > 0.6 * duration).all()  # the first and last hundredths of the way are left out
 
 
 @settings(deadline=None, max_examples=30)
