@@ -16,6 +16,7 @@ import numpy as np
 
 from signface.study.intervals import participant_interval
 from signface.study.responses import LIKERT, Responses
+from signface.study.tables import StudyTable
 from signface.study.thesis_tables import confusions
 
 if TYPE_CHECKING:
@@ -90,6 +91,53 @@ def means_figure(responses: Responses, *, resamples: int, seed: int) -> str:
         return _svg(figure, "Means of every question by method, with 95 % intervals over participants")
 
 
+def differences_figure(responses: Responses, contrasts: StudyTable, models: StudyTable, *, alpha: float = 0.05) -> str:
+    """Differences of means of every pair of methods with their intervals, a panel per question.
+
+    Parameters
+    ----------
+    responses : Responses
+    contrasts, models : StudyTable
+        As `signface.study.model_tables` makes them.
+    alpha : float
+        A difference that the mixed model shows at this level, for the question and then for the pair, is filled.
+    """
+    questions = responses.questions
+    with _style():
+        rows = max((contrasts.frame["", "question"] == name).sum() for name in questions.values())
+        longest = max(len(pair) for pair in contrasts.frame["", "pair"])
+        figure = _figure(1.9 * len(questions) + 0.085 * longest + 1.2, 0.42 * rows + 1.1)
+        panels = figure.subplots(1, len(questions), squeeze=False, sharey=True)[0]
+        for axes, name in zip(panels, questions.values()):
+            own = contrasts.frame[contrasts.frame["", "question"] == name]
+            whole = (
+                models.frame.loc[models.frame["", "question"] == name, [("mixed model", "p (Holm)")]].to_numpy().min()
+            )
+            for row, (_, contrast) in enumerate(own.iterrows()):
+                value, low, high = (contrast["difference of means", part] for part in ("first − second", "low", "high"))
+                shown = whole < alpha and contrast["mixed model", "p (Holm)"] < alpha
+                axes.errorbar(
+                    value,
+                    row,
+                    xerr=[[max(0.0, value - low)], [max(0.0, high - value)]],
+                    fmt="o",
+                    color=COLOURS[0],
+                    markerfacecolor=COLOURS[0] if shown else "white",
+                    capsize=3.5,
+                    linewidth=1.8,
+                )
+            axes.axvline(0, color="#888888", linewidth=1)
+            axes.set_title(name)
+            axes.set_yticks(range(len(own)), own["", "pair"])
+            axes.set_ylim(rows - 0.5, -0.5)
+            axes.xaxis.grid(True, color="#e6e6e6")
+            axes.set_axisbelow(True)
+            axes.set_xlabel("shares" if name == questions.get("correct") else "points")
+            axes.tick_params(axis="y", length=0)
+        _mark(figure, responses)
+        return _svg(figure, "Differences between methods with 95 % intervals over participants")
+
+
 def confusion_figure(responses: Responses) -> str:
     """Confusion matrices by method: percentages of what was played; empty string where no expression was asked."""
     matrices = confusions(responses)
@@ -100,7 +148,7 @@ def confusion_figure(responses: Responses) -> str:
         lines = -(-len(matrices) // columns)
         first = next(iter(matrices.values()))
         size = max(2.6, 0.46 * len(first.columns))
-        figure = _figure(columns * (size + 0.5) + 0.3, lines * (size + 0.75))
+        figure = _figure(columns * (size + 0.5) + 0.3, lines * (size + 1.1))
         for place, (method, counts) in enumerate(matrices.items(), start=1):
             axes = figure.add_subplot(lines, columns, place)
             totals = counts.sum(axis=1).to_numpy()[:, None]
@@ -133,9 +181,9 @@ def expressions_figure(responses: Responses) -> str:
     """Means of every question by played expression, one mark per method."""
     questions, methods, expressions = responses.questions, responses.methods, responses.expressions
     with _style():
-        columns = min(3, len(questions))
+        columns = 2 if len(questions) in (2, 4) else min(3, len(questions))
         lines = -(-len(questions) // columns)
-        figure = _figure(3.3 * columns + 0.3, 2.6 * lines + 0.3)
+        figure = _figure(9.6 if columns > 1 else 4.8, 2.5 * lines + 0.5)
         for place, (column, name) in enumerate(questions.items(), start=1):
             axes = figure.add_subplot(lines, columns, place)
             means = responses.table.groupby(["method", "expression"])[column].mean()
@@ -154,6 +202,8 @@ def expressions_figure(responses: Responses) -> str:
             axes.set_title(name)
             axes.set_xticks(range(len(expressions)), expressions, rotation=_rotation(expressions))
             axes.set_ylim((0, 1.02) if column == "correct" else (LIKERT[0] - 0.1, LIKERT[1] + 0.1))
+            if column != "correct":
+                axes.set_yticks(range(LIKERT[0], LIKERT[1] + 1, 2))
             axes.yaxis.grid(True, color="#e6e6e6")
             axes.set_axisbelow(True)
             axes.tick_params(axis="x", length=0)
@@ -181,7 +231,9 @@ def _style():  # type: ignore[no-untyped-def]  # a context manager of matplotlib
 def _figure(width: float, height: float) -> Figure:
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width, height), layout="constrained")
+    figure = Figure(figsize=(width, height), layout="constrained")
+    figure.get_layout_engine().set(h_pad=0.1, w_pad=0.08)  # type: ignore[union-attr, call-arg]
+    return figure
 
 
 def _mark(figure: Figure, responses: Responses) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 
 from signface.errors import SignfaceError
 from signface.files import whole_file
-from signface.report.study_figures import confusion_figure, expressions_figure, means_figure
+from signface.report.study_figures import confusion_figure, differences_figure, expressions_figure, means_figure
 from signface.study.analysis import Analysis, Section
 from signface.study.tables import StudyTable, as_latex
 
@@ -27,6 +27,9 @@ LARGEST_PICTURES = 20_000_000
 
 #: Tables that are long and folded away in the page.
 FOLDED = {"pairwise_matrix", "influence_details", "habit", "means_by_vision_problem", "means_by_gender"}
+
+#: Text longer than this is broken into lines in a table's cell.
+LONG = 32
 
 #: Short names of the sections for the navigation.
 SHORT = {
@@ -205,6 +208,7 @@ def _table(table: StudyTable, alpha: float) -> dict[str, Any]:
     if reference and not reference.startswith("figure"):
         reference = ("tables " if "," in reference else "table ") + reference
     return {
+        "key": table.key,
         "title": table.title,
         "reference": reference,
         "groups": groups if any(above) else [],
@@ -218,7 +222,7 @@ def _table(table: StudyTable, alpha: float) -> dict[str, Any]:
 def _class(value: object, kind: str, alpha: float) -> str:
     if kind == "p" and isinstance(value, float) and not math.isnan(value) and value < alpha:
         return "low"
-    return "text" if kind == "text" else ""
+    return "" if kind != "text" else "long" if isinstance(value, str) and len(value) > LONG else "text"
 
 
 def _figures(analysis: Analysis) -> dict[str, list[dict[str, str]]]:
@@ -229,11 +233,24 @@ def _figures(analysis: Analysis) -> dict[str, list[dict[str, str]]]:
                 "name": "means_by_method",
                 "svg": means_figure(responses, resamples=analysis.resamples, seed=analysis.seed),
                 "caption": "Means by method. Bars: 95 % bootstrap intervals over participants. The vertical axes are "
-                "cut to show differences; compare the numbers, not the heights.",
+                "cut to show differences; compare the numbers, not the heights. The bars hold what differs between "
+                "participants; two methods may differ although their bars overlap, since the same "
+                "participants saw both.",
             }
         ],
+        "models": [],
         "expressions": [],
     }
+    contrasts, models = analysis.table("contrasts"), analysis.table("models")
+    if contrasts is not None and models is not None:
+        found["models"].append(
+            {
+                "name": "differences",
+                "svg": differences_figure(responses, contrasts, models, alpha=analysis.alpha),
+                "caption": "Differences between methods, with 95 % bootstrap intervals over participants. Filled: shown "
+                "by the mixed model with Holm's correction, for the question and for its pairs.",
+            }
+        )
     matrix = confusion_figure(responses)
     if matrix:
         found["expressions"].append(

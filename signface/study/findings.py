@@ -53,12 +53,12 @@ def findings(
             verb = "the methods differ" if shown else "no difference between the methods is shown"
             said.append(f"{name.capitalize()}: {verb} ({test}); there are too few participants for a model.")
             continue
-        own = contrasts.frame[contrasts.frame["question"] == name]
+        own = contrasts.frame[contrasts.frame[("", "question")] == name]
         pairs = list(combinations(comparison.methods, 2))
         differing = [
             _difference(pair, contrast)
             for pair, (_, contrast) in zip(pairs, own.iterrows())
-            if contrast["p (Holm)"] < alpha
+            if contrast["mixed model", "p (Holm)"] < alpha
         ]
         model = f"mixed model: {_p(model_p)}"
         if model_p < alpha and differing:
@@ -76,13 +76,11 @@ def findings(
 
 
 def _difference(pair: tuple[str, str], contrast) -> str:  # type: ignore[no-untyped-def]  # a row of a data frame
-    first, second = pair if contrast["difference"] >= 0 else pair[::-1]
-    size = abs(contrast["difference"])
-    interval = contrast["95 % interval"]
-    if contrast["difference"] < 0:
-        low, high = (float(word.replace("−", "-")) for word in interval.strip("[]").split(", "))
-        interval = f"[{write_cell(-high, 'mean')}, {write_cell(-low, 'mean')}]".replace("-", "−")
-    return f"{first} is higher than {second} by {size:.2f} {interval}"
+    value, low, high = (contrast["difference of means", part] for part in ("first − second", "low", "high"))
+    if value < 0:
+        pair, value, low, high = pair[::-1], -value, -high, -low
+    interval = f"{low:.2f} to {high:.2f}".replace("-", "−")
+    return f"{pair[0]} is higher than {pair[1]} by {value:.2f} (95 % interval {interval})"
 
 
 def _p(value: float) -> str:

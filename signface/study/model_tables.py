@@ -23,7 +23,7 @@ from signface.study.intervals import difference_intervals
 from signface.study.mixed_models import OrdinalFit, OrdinalMixedModel
 from signface.study.rank_tests import dunn, friedman, wilcoxon
 from signface.study.responses import Responses
-from signface.study.tables import StudyTable, write_cell
+from signface.study.tables import StudyTable
 from signface.study.test_result import TestResult
 from signface.study.thesis_tables import RESULT_KINDS, _result_cells, paired, participant_means
 
@@ -267,27 +267,24 @@ def contrasts_table(
             people.append(wilcoxon(means[first], means[second]))
         rows += [
             {
-                "question": responses.questions[column],
-                "pair": f"{first} – {second}",
-                "difference": intervals[first, second][0],
-                "95 % interval": _interval(*intervals[first, second][1:]),
-                "odds ratio": odds[first, second],
-                "p": model_p[place],
-                "p (Holm)": float(corrected),
-                "r": people[place].effect,
-                "p over participants": people[place].p,
-                "p over participants (Holm)": float(by_people),
+                ("", "question"): responses.questions[column],
+                ("", "pair"): f"{first} – {second}",
+                ("difference of means", "first − second"): intervals[first, second][0],
+                ("difference of means", "low"): intervals[first, second][1],
+                ("difference of means", "high"): intervals[first, second][2],
+                ("mixed model", "odds ratio, 95 %"): odds[first, second],
+                ("mixed model", "p"): model_p[place],
+                ("mixed model", "p (Holm)"): float(corrected),
+                ("over participants", "r"): people[place].effect,
+                ("over participants", "p"): people[place].p,
+                ("over participants", "p (Holm)"): float(by_people),
             }
             for place, ((first, second), corrected, by_people) in enumerate(
                 zip(pairs, holm(model_p), holm([result.p for result in people]))
             )
         ]
     kinds: dict[str | tuple[str, str], str] = {
-        "p": "p",
-        "p (Holm)": "p",
-        "p over participants": "p",
-        "p over participants (Holm)": "p",
-        "r": "effect",
+        (part, name): "p" for part in ("mixed model", "over participants") for name in ("p", "p (Holm)")
     }
     return StudyTable(
         "contrasts",
@@ -295,15 +292,11 @@ def contrasts_table(
         pd.DataFrame(rows),
         kinds,
         notes=(
-            "Difference: mean of the first method less mean of the second; its interval is a bootstrap over "
+            "Low and high: 95 % interval of the difference, a bootstrap over "
             "participants. Odds ratio and p: mixed model; above 1 where the first method is answered higher. r and p "
             "over participants: Wilcoxon on one mean per participant and method. Holm's correction within a question.",
         ),
     )
-
-
-def _interval(low: float, high: float) -> str:
-    return f"[{write_cell(low, 'mean')}, {write_cell(high, 'mean')}]".replace("-", "−")
 
 
 def posthoc_table(responses: Responses) -> StudyTable:

@@ -154,7 +154,7 @@ def _sentence(responses: Responses, found: Influence) -> str:
     p = f"p {p}" if p.startswith("<") else f"p = {p}"
     if found.result.symbol == "ρ":
         way = "rises" if found.result.effect > 0 else "falls"
-        return f"{name.capitalize()} {way} with {factor} (ρ = {found.result.effect:.3f}, {p})".replace("-", "−")
+        return f"{name.capitalize()} {way} with {factor} (ρ = {write_cell(found.result.effect, 'effect')}, {p})"
     means = table.groupby(found.factor)[found.question].mean().sort_values(ascending=False)
     listed = ", ".join(
         f"{level:g} {mean:.2f}" if isinstance(level, float) else f"{level} {mean:.2f}" for level, mean in means.items()

@@ -70,6 +70,8 @@ def write_cell(cell: object, kind: str) -> str:
 
     >>> write_cell(0.0003, "p"), write_cell(0.7245, "p"), write_cell(float("nan"), "mean")
     ('<0.001', '0.725', '–')
+    >>> write_cell(-0.25, "effect"), write_cell(82.0, "statistic"), write_cell(29141.5, "statistic")
+    ('−0.250', '82', '29141.5')
     """
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
         return "–"
@@ -81,8 +83,11 @@ def write_cell(cell: object, kind: str) -> str:
             return "<0.001"
         # the thesis writes 0.0498 so that it does not read 0.050: a fourth decimal where three would touch 0.05
         return f"{number:.4f}" if 0.0495 <= number < 0.0505 else f"{number:.3f}"
-    written = f"{number:.{DECIMALS[kind]}f}"
-    return written[1:] if written.startswith("-") and float(written) == 0 else written
+    decimals = DECIMALS[kind]
+    if kind == "statistic" and (number.is_integer() or abs(number) >= 1000):  # a count of pairs, a sum of ranks
+        decimals = 0 if number.is_integer() else 1
+    written = f"{number:.{decimals}f}"
+    return written.lstrip("-") if float(written) == 0 else written.replace("-", "−")
 
 
 def as_text(table: StudyTable) -> str:
