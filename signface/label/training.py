@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 
 import numpy as np
+import pandas as pd
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
@@ -58,7 +59,7 @@ class Example:
             )
 
     @property
-    def stable(self):
+    def stable(self) -> pd.DataFrame:
         """The rows of the reference's stable segments."""
         return self.reference.table[self.reference.table["kind"] == "stable"]
 
