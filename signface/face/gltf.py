@@ -86,8 +86,22 @@ def write_face(face: FaceModel, path: str | PathLike[str]) -> None:
     SignfaceError
         The ending is not `.glb`, or the file cannot be written.
     """
-    from pygltflib import GLTF2, Accessor, Asset, Attributes, Buffer, Material, Mesh, Node, PbrMetallicRoughness
-    from pygltflib import AccessorSparseIndices, AccessorSparseValues, Primitive, Scene, Sparse
+    from pygltflib import (
+        GLTF2,
+        Accessor,
+        AccessorSparseIndices,
+        AccessorSparseValues,
+        Asset,
+        Attributes,
+        Buffer,
+        Material,
+        Mesh,
+        Node,
+        PbrMetallicRoughness,
+        Primitive,
+        Scene,
+        Sparse,
+    )
 
     if Path(path).suffix.lower() != ".glb":
         raise SignfaceError("a face is written as .glb", file=path, hint="choose a name that ends in .glb")

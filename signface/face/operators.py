@@ -57,6 +57,7 @@ def thin_shell_matrices(face: FaceModel) -> tuple[np.ndarray, np.ndarray]:
     columns = face.bases.transpose(1, 0, 2).reshape(vertices, 3 * count)
     stiff = stiffness @ columns
     stretching = np.einsum("vid,vjd->ij", columns.reshape(vertices, count, 3), stiff.reshape(vertices, count, 3))
-    curved = (stiff / np.sqrt(mass)[:, None]).reshape(vertices, count, 3)
+    inverse = np.divide(1.0, np.sqrt(mass), where=mass > 0, out=np.zeros(vertices))  # a loose vertex has no skin
+    curved = (stiff * inverse[:, None]).reshape(vertices, count, 3)
     bending = np.tensordot(curved, curved, axes=((0, 2), (0, 2)))
     return 0.5 * (stretching + stretching.T), 0.5 * (bending + bending.T)

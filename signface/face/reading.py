@@ -19,6 +19,8 @@ from signface.errors import SignfaceError
 from signface.face.gltf import RawFace, read_gltf
 from signface.face.mesh import Mesh
 from signface.face.model import FaceModel
+from signface.face.obj import read_obj_folder
+from signface.face.wfm import read_wfm
 from signface.files import models_folder, shipped
 
 #: Millimetres in each unit a face may come in.
@@ -71,10 +73,18 @@ def read_face(name_or_path: str | PathLike[str] = "default", *, neutral: str | N
             "no such face", file=path, hint=f"give a file, a folder, or a shipped face: {', '.join(faces)}"
         )
     suffix = path.suffix.lower()
-    if suffix in (".glb", ".gltf") and path.is_file():
+    if path.is_dir():
+        raw = read_obj_folder(path, neutral)
+    elif suffix == ".wfm":
+        raw = read_wfm(path)
+    elif suffix in (".glb", ".gltf"):
         raw = read_gltf(path)
+    elif suffix == ".obj":
+        raise SignfaceError("is one shape, not a face", file=path, hint="give the folder with one .obj for each base")
     else:
-        raise SignfaceError("is not a face that signface reads", file=path, hint="give .glb, .gltf, a folder of .obj")
+        raise SignfaceError(
+            "is not a face that signface reads", file=path, hint="give .glb, .gltf, .wfm or a folder of .obj files"
+        )
     return face_in_millimetres(raw, path)
 
 
