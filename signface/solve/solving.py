@@ -1,10 +1,13 @@
 """A take to descriptors: the whole way from markers to weights.
 
-- `solve_take`: clean, take head motion away, adapt to the avatar, solve.
+- `solve_take`: the whole way.
+- `prepare_take`: its first half, marker displacements on the avatar; every solver starts from these.
 - `neutral_markers`: where each face marker stands in the neutral frame.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +17,6 @@ from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.solve.adaptation import MorphologicalAdaptation
 from signface.solve.methods import make_solver
-from signface.solve.solver import Solution
 from signface.takes.filtering import CUTOFF_HZ, lowpass
 from signface.takes.gaps import LONG_S, SHORT_S, fill_gaps
 from signface.takes.labels import rename_to
@@ -25,6 +27,83 @@ from signface.takes.take import Take
 #: The neutral place of a marker is its median within this time of the neutral frame (s): one frame's jitter would
 #: otherwise be carried into every frame of the take.
 NEUTRAL_WINDOW_S = 0.05
+
+
+@dataclass(frozen=True)
+class PreparedTake:
+    """A take brought to the avatar, ready to be solved.
+
+    Parameters
+    ----------
+    displacements : (F, P, 3) array
+        Displacements of the face markers from their neutral places (eq. 5.21), adapted to the avatar, millimetres;
+        NaN where a marker is missing.
+    layout : MarkerLayout
+        The given layout without the markers that the neutral frame does not show; `displacements` follows it.
+    head : (F, 4, 4) array
+        Poses of the head.
+    adaptation : MorphologicalAdaptation
+        From the signer's face, in its neutral pose, to the avatar's.
+    take : Take
+        The cleaned take.
+    note : str
+        What was done, for the history.
+    """
+
+    displacements: np.ndarray
+    layout: MarkerLayout
+    head: np.ndarray
+    adaptation: MorphologicalAdaptation
+    take: Take
+    note: str
+
+
+def prepare_take(
+    take: Take,
+    face: FaceModel,
+    layout: MarkerLayout,
+    *,
+    neutral: str | float = "auto",
+    short_gap_s: float = SHORT_S,
+    long_gap_s: float = LONG_S,
+    cutoff_hz: float = CUTOFF_HZ,
+    filter_method: str = "butterworth",
+    head_fallback: str | None = None,
+) -> PreparedTake:
+    """Clean a take, take the head's motion away and adapt it to the avatar (seed 001, 5.2.1 and 5.2.2).
+
+    Parameters and errors are those of `solve_take`.
+    """
+    known = rename_to(take, layout.labels)
+    clean = lowpass(fill_gaps(known, short_s=short_gap_s, long_s=long_gap_s), cutoff_hz=cutoff_hz, method=filter_method)
+    labels = [label for label in layout.face_labels if label in clean.labels]
+    head = [label for label in layout.head_labels if label in clean.labels]
+    if neutral == "auto":
+        time = find_neutral(clean, labels, head=head)
+        found = "found"
+    else:
+        time, found = float(neutral), "given"
+    clean.frame_at(time)
+    shown, places = neutral_markers(clean, labels, time)
+    if len(shown) < 4:
+        raise SignfaceError(
+            f"only {len(shown)} face markers are seen at the neutral time {time:.3f} s",
+            file=take.name,
+            hint="give another neutral time: --neutral SECONDS",
+        )
+    part = layout.restricted([*shown, *head])
+    target = part.points(face, shown)
+    aligned = align_neutral(clean, shown, target, time)
+    still, poses = stabilise(aligned, head=head, neutral_s=time, fallback=head_fallback)
+    _, places = neutral_markers(still, shown, time)
+    adaptation = MorphologicalAdaptation(places, target)
+    dropped = [label for label in layout.face_labels if label not in shown]
+    note = f"neutral frame {found} at {time:.3f} s; adapted to {face.name} by {len(shown)} markers of {layout.name}"
+    note += f" without {', '.join(dropped[:5])}{' ...' * (len(dropped) > 5)}" if dropped else ""
+    note += f", passing by them ({adaptation.smoothing:.1g})" if adaptation.smoothing else ""
+    # Against the adapted neutral, not the avatar's: where the map passes by the markers, rest must still be rest.
+    displacements = adaptation.transform(still.select(shown)) - adaptation.transform(places)
+    return PreparedTake(displacements, part, poses, adaptation, still, note)
 
 
 def solve_take(
@@ -83,46 +162,28 @@ def solve_take(
     >>> solve_take(take, face, choose_layout(take.labels, face)).weights.shape  # doctest: +SKIP
     (12000, 51)
     """
-    known = rename_to(take, layout.labels)
-    clean = lowpass(fill_gaps(known, short_s=short_gap_s, long_s=long_gap_s), cutoff_hz=cutoff_hz, method=filter_method)
-    labels = [label for label in layout.face_labels if label in clean.labels]
-    head = [label for label in layout.head_labels if label in clean.labels]
-    if neutral == "auto":
-        time = find_neutral(clean, labels, head=head)
-        found = "found"
-    else:
-        time, found = float(neutral), "given"
-    clean.frame_at(time)
-    shown, places = neutral_markers(clean, labels, time)
-    if len(shown) < 4:
-        raise SignfaceError(
-            f"only {len(shown)} face markers are seen at the neutral time {time:.3f} s",
-            file=take.name,
-            hint="give another neutral time: --neutral SECONDS",
-        )
-    part = layout.restricted([*shown, *head])
-    target = part.points(face, shown)
-    aligned = align_neutral(clean, shown, target, time)
-    still, poses = stabilise(aligned, head=head, neutral_s=time, fallback=head_fallback)
-    _, places = neutral_markers(still, shown, time)
-    adaptation = MorphologicalAdaptation(places, target)
-    solver = make_solver(method, face, part, alpha=alpha)
-    displacements = adaptation.transform(still.select(shown)) - target
-    solution: Solution = solver.solve(displacements)
-    dropped = [label for label in layout.face_labels if label not in shown]
-    note = f"neutral frame {found} at {time:.3f} s; solve {method}"
-    note += f" alpha={alpha:g}" if alpha is not None else ""
-    note += f" on {face.name} by {len(shown)} markers of {layout.name}"
-    note += f" without {', '.join(dropped[:5])}{' ...' * (len(dropped) > 5)}" if dropped else ""
+    prepared = prepare_take(
+        take,
+        face,
+        layout,
+        neutral=neutral,
+        short_gap_s=short_gap_s,
+        long_gap_s=long_gap_s,
+        cutoff_hz=cutoff_hz,
+        filter_method=filter_method,
+        head_fallback=head_fallback,
+    )
+    solution = make_solver(method, face, prepared.layout, alpha=alpha).solve(prepared.displacements)
+    note = f"{prepared.note}; solve {method}" + (f" alpha={alpha:g}" if alpha is not None else "")
     return Descriptors(
         weights=solution.weights,
         names=face.names,
         rate=take.rate,
         start=take.start,
         residual=solution.residual,
-        head=poses,
+        head=prepared.head,
         name=take.name,
-        history=(*still.history, note),
+        history=(*prepared.take.history, note),
     )
 
 
