@@ -25,6 +25,7 @@ COMMANDS = {
     "face": "look at, check, convert and list faces",
     "layout": "show, check and suggest marker layouts",
     "synth": "make a synthetic corpus",
+    "elan": "check, map, compare and learn from EAF files; a button inside ELAN",
     "demo": "annotate the takes that ship with signface",
 }
 

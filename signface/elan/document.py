@@ -28,6 +28,7 @@ SCHEMA_URL = "http://www.mpi.nl/tools/elan/EAFv3.0.xsd"
 #: Prefix of our own header properties.
 PROPERTY_PREFIX = "signface:"
 WRITTEN_PREFIX = f"{PROPERTY_PREFIX}written:"
+CHANNEL_PREFIX = f"{PROPERTY_PREFIX}channel:"
 
 #: Start and end in milliseconds (None where the file leaves them open) and value of an annotation.
 Row = tuple[int | None, int | None, str]

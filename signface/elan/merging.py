@@ -13,7 +13,7 @@ from pathlib import Path
 from lxml import etree
 
 from signface.elan.document import (
-    PROPERTY_PREFIX,
+    CHANNEL_PREFIX,
     WRITTEN_PREFIX,
     Row,
     fresh_ids,
@@ -38,8 +38,6 @@ from signface.elan.tiers import Tier, clean_name, tier_name
 from signface.elan.upgrade import insert_in_order
 from signface.elan.vocabularies import Vocabulary
 from signface.errors import SignfaceError
-
-CHANNEL_PREFIX = f"{PROPERTY_PREFIX}channel:"
 
 
 @dataclass

@@ -1,7 +1,13 @@
-"""`read_reference`: what an annotator wrote on the affect tier, as segments."""
+"""What annotators wrote, as tables.
+
+- `read_reference`: the affect tier of a signer, as segments.
+- `read_tiers`: every independent tier.
+- `read_corrections`: the affect tier as signface wrote it, and as it is now.
+"""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable
 from itertools import pairwise
 from os import PathLike
@@ -10,13 +16,13 @@ from pathlib import Path
 import pandas as pd
 from lxml import etree
 
-from signface.elan.document import read_document, tier_rows
+from signface.elan.checking import check_document
+from signface.elan.document import CHANNEL_PREFIX, Row, read_document, recorded, tier_rows
+from signface.elan.tiers import clean_name, tier_name
 from signface.elan.vocabularies import AFFECT, INTENSITY
 from signface.errors import SignfaceError
 from signface.label.vocabulary import AFFECTS
 from signface.segment.segments import Segments
-
-Row = tuple[int | None, int | None, str]
 
 
 def read_reference(
@@ -29,7 +35,8 @@ def read_reference(
     eaf : path
         An EAF, format 2.5 to 3.0.
     signer : str, optional
-        Whose tier: `affect@SIGNER`, else `affect`. When not given, `affect` or the only tier `affect@...`.
+        Whose tier: `affect@SIGNER`, else `affect`, else the lab's tier that signface wrote the signer's affect to.
+        When not given, `affect` or the only such tier.
     labels : iterable of str, optional
         The labels allowed; by default `N A D F J Sa Su` and their transitions.
 
@@ -38,7 +45,7 @@ def read_reference(
     Segments
         `start_s, end_s, kind, label`; `intensity` (1, 2, 3 or missing) where a tier `intensity@SIGNER` exists.
         Annotations without a value are left out. Missing time values, which ELAN allows within a chain of
-        annotations, are spread evenly between the known ones.
+        annotations, are spread evenly between the known ones. A lab's values are turned back into labels.
 
     Raises
     ------
@@ -52,9 +59,85 @@ def read_reference(
     _fill_times(root)
     tiers = tier_rows(root)
     allowed = set(AFFECT.values if labels is None else labels)
+    rows = _checked_rows(tiers[name], name, channel_labels(root).get(name, ("", {}))[1], allowed, file)
+    stable = set(AFFECTS) if labels is None else {label for label in allowed if not _is_transition(label, allowed)}
+    table = _table(rows)
+    table.insert(2, "kind", ["stable" if label in stable else "transition" for label in table["label"]])
+    intensity_name = "intensity" + name.removeprefix("affect")
+    if intensity_name in tiers:
+        table["intensity"] = _intensities(rows, tiers[intensity_name], intensity_name, file)
+    return Segments(table, name=file.stem, history=(f"read_reference {file.name} {name}",))
+
+
+def read_tiers(eaf: str | PathLike[str]) -> dict[str, pd.DataFrame]:
+    """Every tier that hangs on no other, as a table `start_s, end_s, label`; annotations without a value left out.
+
+    Raises
+    ------
+    SignfaceError
+        The file is no EAF, or is broken (`checking.check_document`).
+    """
+    file = Path(eaf)
+    root = read_document(file).getroot()
+    check_document(root, file)
+    _fill_times(root)
+    rows = tier_rows(root)
+    independent = [tier.get("TIER_ID") or "" for tier in root.iterfind("TIER") if tier.get("PARENT_REF") is None]
+    return {name: _table([row for row in rows[name] if row[2].strip()]) for name in independent}
+
+
+def read_corrections(eaf: str | PathLike[str], signer: str | None = None) -> tuple[pd.DataFrame, pd.DataFrame] | None:
+    """The affect tier as signface wrote it and as it is now: two tables `start_s, end_s, label`.
+
+    None when signface did not write the tier, so that nothing can be said of corrections.
+
+    Raises
+    ------
+    SignfaceError
+        As `read_reference`.
+    """
+    file = Path(eaf)
+    root = read_document(file).getroot()
+    name = _affect_tier_name(root, signer, file)
+    written = recorded(root).get(name)
+    if written is None:
+        return None
+    meaning = channel_labels(root).get(name, ("", {}))[1]
+    before = _table([(start, end, meaning.get(value, value)) for start, end, value in written])
+    after = read_reference(file, signer).table[["start_s", "end_s", "label"]]
+    return before, after
+
+
+def channel_labels(root: etree._Element) -> dict[str, tuple[str, dict[str, str]]]:
+    """For each of a lab's tiers that signface wrote to: the channel, and our label for each of the lab's values."""
+    found = {}
+    for element in root.iterfind("HEADER/PROPERTY"):
+        name = element.get("NAME") or ""
+        if not name.startswith(CHANNEL_PREFIX):
+            continue
+        try:
+            content = json.loads(element.text or "")
+            labels = {str(value): str(label) for value, label in content["labels"].items()}
+            found[name[len(CHANNEL_PREFIX) :]] = (str(content["channel"]), labels)
+        except (ValueError, KeyError, TypeError, AttributeError):
+            continue  # edited by someone: the tier is then read as any other
+    return found
+
+
+def _table(rows: Iterable[Row]) -> pd.DataFrame:
+    """Rows as a table in seconds, without those whose time is unknown."""
+    known = [(start / 1000, end / 1000, label) for start, end, label in rows if start is not None and end is not None]
+    table = pd.DataFrame(known, columns=["start_s", "end_s", "label"])
+    return table.astype({"start_s": float, "end_s": float, "label": object})
+
+
+def _checked_rows(
+    annotations: list[Row], name: str, meaning: dict[str, str], allowed: set[str], file: Path
+) -> list[tuple[int, int, str]]:
+    """The annotations with a value, as labels; each with a time, in the vocabulary, none overlapping another."""
     rows: list[tuple[int, int, str]] = []
-    for start, end, value in tiers[name]:
-        label = value.strip()
+    for start, end, value in annotations:
+        label = meaning.get(value, value.strip())
         if not label:
             continue
         if start is None or end is None or start >= end:
@@ -68,19 +151,7 @@ def read_reference(
         if rows and start < rows[-1][1]:
             raise SignfaceError(f"annotations on tier {name} overlap at {start / 1000:.3f} s", file=file)
         rows.append((start, end, label))
-    stable = set(AFFECTS) if labels is None else {label for label in allowed if not _is_transition(label, allowed)}
-    table = pd.DataFrame(
-        {
-            "start_s": [start / 1000 for start, _, _ in rows],
-            "end_s": [end / 1000 for _, end, _ in rows],
-            "kind": ["stable" if label in stable else "transition" for _, _, label in rows],
-            "label": [label for _, _, label in rows],
-        }
-    )
-    intensity_name = "intensity" + name.removeprefix("affect")
-    if intensity_name in tiers:
-        table["intensity"] = _intensities(rows, tiers[intensity_name], intensity_name, file)
-    return Segments(table, name=file.stem, history=(f"read_reference {file.name} {name}",))
+    return rows
 
 
 def _is_transition(label: str, labels: set[str]) -> bool:
@@ -89,28 +160,26 @@ def _is_transition(label: str, labels: set[str]) -> bool:
 
 
 def _affect_tier_name(root: etree._Element, signer: str | None, file: Path) -> str:
-    names = [tier.get("TIER_ID") or "" for tier in root.iterfind("TIER")]
-    affect = [name for name in names if name == "affect" or name.startswith("affect@")]
+    tiers = {tier.get("TIER_ID") or "": tier for tier in root.iterfind("TIER")}
+    labs = [name for name, (channel, _) in channel_labels(root).items() if channel == "affect" and name in tiers]
+    affect = [name for name in tiers if name == "affect" or name.startswith("affect@")]
+    there = f"its tiers are {', '.join(list(tiers)[:12]) or 'none'}"
     if signer:
-        from signface.elan.tiers import tier_name
-
+        own = [name for name in labs if tiers[name].get("PARTICIPANT") == clean_name(signer)]
         for wanted in (tier_name("affect", signer), "affect"):
             if wanted in affect:
                 return wanted
-        raise SignfaceError(
-            f"no tier affect@{signer} or affect",
-            file=file,
-            hint=f"its tiers are {', '.join(names[:12]) or 'none'}",
-        )
+        if len(own) == 1 or len(labs) == 1:
+            return (own or labs)[0]
+        raise SignfaceError(f"no tier affect@{signer} or affect", file=file, hint=there)
     if "affect" in affect:
         return "affect"
-    if len(affect) == 1:
-        return affect[0]
-    if affect:
-        raise SignfaceError(f"has several affect tiers: {', '.join(affect)}", file=file, hint="name the signer")
-    raise SignfaceError(
-        "no tier affect or affect@SIGNER", file=file, hint=f"its tiers are {', '.join(names[:12]) or 'none'}"
-    )
+    candidates = affect or labs
+    if len(candidates) == 1:
+        return candidates[0]
+    if candidates:
+        raise SignfaceError(f"has several affect tiers: {', '.join(candidates)}", file=file, hint="name the signer")
+    raise SignfaceError("no tier affect or affect@SIGNER", file=file, hint=there)
 
 
 def _fill_times(root: etree._Element) -> None:

@@ -115,7 +115,6 @@ def find_channels(
             events = head_events(descriptors, dict(_values(table)))
             if events is None:
                 continue
-            values = {value: str(rule.get("description", "")) for value, rule in _values(table)}
         else:
             signals = {
                 value: signal
@@ -126,10 +125,24 @@ def find_channels(
                 continue
             together = [tuple(pair) for pair in table.get("together", [])]
             events = _weight_events(descriptors, signals, dict(_values(table)), together)
-            values = {value: str(rule.get("description", "")) for value, rule in _values(table)}
-            values |= {joined: f"{first} and {second} together" for first, second, joined in together}
-        found.append(ChannelEvents(channel, str(table.get("description", channel)), values, events))
+        found.append(ChannelEvents(channel, str(table.get("description", channel)), _vocabulary(table), events))
     return found
+
+
+def closed_vocabularies(channels: Mapping[str, Mapping[str, Any]]) -> list[ChannelEvents]:
+    """Every channel with the values that it can hold and no events."""
+    empty = pd.DataFrame(columns=["start_s", "end_s", "value"])
+    return [
+        ChannelEvents(channel, str(table.get("description", channel)), _vocabulary(table), empty)
+        for channel, table in channels.items()
+        if channel != "intensity"
+    ]
+
+
+def _vocabulary(table: Mapping[str, Any]) -> dict[str, str]:
+    """Every value of a channel and its description, those of pairs among them."""
+    values = {value: str(rule.get("description", "")) for value, rule in _values(table)}
+    return values | {joined: f"{first} and {second} together" for first, second, joined in table.get("together", [])}
 
 
 def find_intensities(

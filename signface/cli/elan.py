@@ -1,0 +1,343 @@
+"""`signface elan`: check files, map a template, learn from corrections, compare annotators, install the recogniser."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from signface.cli.progress import progress
+from signface.errors import SignfaceError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+EXAMPLE = """  signface elan check corrected/*.eaf
+  signface elan map lab.etf -o mapping.toml
+  signface elan learn corpora/mine -o mine.skops
+  signface elan agree eva.eaf tom.eaf -o agreement/
+  signface elan install-recogniser --elan /opt/ELAN_7-0"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Fill the parser of this command."""
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+
+    check = actions.add_parser("check", help="say what is wrong with EAF files")
+    check.add_argument("files", nargs="+", type=Path, metavar="EAF")
+    check.add_argument(
+        "--duration", type=float, metavar="SECONDS", help="length of the film; annotations after it are named"
+    )
+
+    mapping = actions.add_parser("map", help="write a first mapping file for a lab's template")
+    mapping.add_argument("template", type=Path, metavar="ETF_OR_EAF")
+    mapping.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="a .toml file")
+
+    learn = actions.add_parser("learn", help="show what annotators corrected, and train on it")
+    learn.add_argument("corpus", type=Path, metavar="CORPUS", help="a corpus whose annotations were corrected")
+    learn.add_argument("-o", "--output", type=Path, metavar="MODEL", help="a .skops file; nothing is trained without")
+    learn.add_argument(
+        "--before",
+        default="default",
+        metavar="NAME_OR_FILE",
+        help="the classifier in use so far (default: %(default)s)",
+    )
+    learn.add_argument("--classifier", default="forest", metavar="NAME", help="what to train (default: %(default)s)")
+    learn.add_argument(
+        "--with", dest="others", action="append", default=[], type=Path, metavar="CORPUS",
+        help="train on this corpus as well; may be repeated",
+    )  # fmt: skip
+    learn.add_argument("--seed", type=int, default=0, help="default: %(default)s")
+
+    agree = actions.add_parser("agree", help="agreement between annotators, or between one and the machine")
+    agree.add_argument("files", nargs="+", type=Path, metavar="EAF", help="two or more files of one take")
+    agree.add_argument(
+        "--tier", action="append", default=[], metavar="NAME",
+        help="a tier of every file; may be repeated (default: all independent tiers that every file has)",
+    )  # fmt: skip
+    agree.add_argument(
+        "--overlap", type=float, default=0.6, metavar="SHARE",
+        help="share of the longer annotation that must overlap for a match (default: %(default)s)",
+    )  # fmt: skip
+    agree.add_argument("--gamma", action="store_true", help="compute gamma too (slow)")
+    agree.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="also write tables (.csv) and pictures")
+
+    install = actions.add_parser("install-recogniser", help="write the recogniser that ELAN itself runs")
+    install.add_argument("--elan", type=Path, metavar="FOLDER", help="where ELAN is installed")
+    install.add_argument(
+        "-o", "--output", type=Path, default=Path("signface-recogniser"), metavar="FOLDER",
+        help="where to write it when --elan is not given (default: %(default)s)",
+    )  # fmt: skip
+
+    actions.add_parser("recognise", help="annotate a take for ELAN, which runs this itself")
+
+
+def run(arguments: argparse.Namespace) -> int | None:
+    """Run one action."""
+    actions = {
+        "check": check_files,
+        "map": write_mapping,
+        "learn": learn_corrections,
+        "agree": compare_annotators,
+        "install-recogniser": install_recogniser,
+        "recognise": recognise,
+    }
+    return actions[arguments.action](arguments)
+
+
+def check_files(arguments: argparse.Namespace) -> int:
+    """Name every problem of every file; exit status 2 when there is any."""
+    from signface.elan.checking import find_problems
+    from signface.elan.document import read_document
+
+    media_ms = None if arguments.duration is None else 1000 * arguments.duration
+    bad = 0
+    for file in arguments.files:
+        try:
+            root = read_document(file).getroot()
+        except SignfaceError as error:
+            print(error)
+            bad += 1
+            continue
+        problems = list(find_problems(root, media_ms=media_ms))
+        bad += bool(problems)
+        tiers = root.findall("TIER")
+        annotations = len(root.findall("TIER/ANNOTATION"))
+        state = f"{len(problems)} problem{'s' * (len(problems) != 1)}" if problems else "no problem"
+        print(f"{file}: EAF {root.get('VERSION')}, {len(tiers)} tiers, {annotations} annotations, {state}")
+        for problem in problems:
+            print(f"  {problem}")
+    return 2 if bad else 0
+
+
+def write_mapping(arguments: argparse.Namespace) -> None:
+    """Write a first mapping file."""
+    from signface.elan.channels import vocabulary_of
+    from signface.elan.document import read_document
+    from signface.elan.mapping import suggest_mapping
+    from signface.elan.vocabularies import AFFECT, INTENSITY, Vocabulary
+    from signface.files import whole_file
+    from signface.label.channels import closed_vocabularies, read_channels
+
+    if arguments.output.suffix.lower() != ".toml":
+        raise SignfaceError("the ending of a mapping file is .toml", file=arguments.output)
+    if arguments.output.exists():
+        raise SignfaceError("exists", file=arguments.output, hint="name another file, or remove this one")
+    vocabularies: dict[str, Vocabulary | None] = {
+        "affect": AFFECT,
+        "affect-confidence": None,
+        "intensity": INTENSITY,
+        "affect-doubtful": AFFECT,
+    }
+    vocabularies |= {found.channel: vocabulary_of(found) for found in closed_vocabularies(read_channels())}
+    text = suggest_mapping(read_document(arguments.template).getroot(), vocabularies)
+    with whole_file(arguments.output) as temporary:
+        temporary.write_text(text, "utf-8")
+    print(f"{arguments.output}: written; look through it before it is used")
+
+
+def learn_corrections(arguments: argparse.Namespace) -> None:
+    """Show the corrections, compare before and after on takes held out, train on all and save."""
+    import pandas as pd
+
+    from signface.corpus.examples import solve_examples
+    from signface.corpus.manifest import read_corpus
+    from signface.elan.reference import read_corrections
+    from signface.evaluate.corrections import changes, summarise_changes
+
+    corpus = read_corpus(arguments.corpus)
+    annotated = [(entry.annotation, entry.signer) for entry in corpus if entry.annotation is not None]
+    found, total, unknown = [], 0, 0
+    for annotation, signer in annotated:
+        tables = read_corrections(annotation, signer)
+        if tables is None:
+            unknown += 1
+            continue
+        found.append(changes(*tables))
+        total += len(tables[0])
+    if unknown:
+        print(
+            f"{unknown} of {len(annotated)} annotations were not written by signface: they are learnt from as they are"
+        )
+    if found:
+        print("\n".join(summarise_changes(pd.concat(found, ignore_index=True), total)))
+    if arguments.output is None:
+        return
+    if arguments.output.suffix.lower() != ".skops":
+        raise SignfaceError("the ending of a classifier is .skops", file=arguments.output)
+
+    from signface.label.persistence import load_model, save_model
+    from signface.label.relearning import held_out_labels
+    from signface.label.training import train_model
+
+    def solved(folder: Path) -> list:
+        own = read_corpus(folder)
+        count = sum(entry.annotation is not None for entry in own)
+        return solve_examples(own, progress=lambda items: progress(items, "solving", total=count))
+
+    before = load_model(arguments.before)
+    corrected = solved(arguments.corpus)
+    others = [example for folder in arguments.others for example in solved(folder)]
+    scores = {}
+    if len(corrected) > 1:
+        labels = held_out_labels(corrected, before, others=others, classifier=arguments.classifier, seed=arguments.seed)
+        print(_before_and_after(labels, before.name))
+        scores = {"accuracy on corrected takes held out": float((labels["after"] == labels["label"]).mean())}
+        known = {example.take for example in corrected} & set(before.card.takes)
+        if known:
+            print(f"{before.name} was trained on {len(known)} of these takes: its accuracy flatters it")
+    else:
+        print("one take cannot be held out of itself: no comparison")
+    model = train_model(
+        [*corrected, *others],
+        classifier=arguments.classifier,
+        seed=arguments.seed,
+        face="default",
+        layout="chosen by markers",
+        corpus=" + ".join(folder.resolve().name for folder in (arguments.corpus, *arguments.others)),
+        scores=scores,
+        name=arguments.output.stem,
+    )
+    save_model(model, arguments.output)
+    print(f"{arguments.output}: {model.card.classifier} trained on {len(model.card.takes)} takes")
+
+
+def _before_and_after(labels: pd.DataFrame, name: str) -> str:
+    """A small table: accuracy on the stable segments of takes held out, before and after."""
+    before, after = (labels[column] == labels["label"] for column in ("before", "after"))
+    lines = [
+        f"stable segments of takes held out: {len(labels)} in {labels['take'].nunique()} takes",
+        f"  before ({name}): {before.mean():.2f} right",
+        f"  after: {after.mean():.2f} right ({(after & ~before).sum()} better, {(before & ~after).sum()} worse)",
+    ]
+    return "\n".join(lines)
+
+
+def compare_annotators(arguments: argparse.Namespace) -> None:
+    """Print the agreement on every tier; write tables and pictures when asked."""
+    import pandas as pd
+
+    from signface.elan.reference import read_tiers
+    from signface.evaluate.agreement import agreement_table, confusion, frame_labels, modified_kappa
+
+    files = arguments.files
+    if len(files) < 2:
+        raise SignfaceError("agreement needs two files or more", hint="name the files of two annotators")
+    names = _names(files)
+    read = {name: read_tiers(file) for name, file in zip(names, files, strict=True)}
+    common = [tier for tier in read[names[0]] if all(tier in tiers for tiers in read.values())]
+    wanted = arguments.tier or [tier for tier in common if any(len(tiers[tier]) for tiers in read.values())]
+    missing = [tier for tier in wanted if tier not in common]
+    if missing or not wanted:
+        raise SignfaceError(
+            f"not every file has a tier {missing[0]}" if missing else "the files have no filled tier in common",
+            hint=f"tiers of all are {', '.join(common) or 'none'}",
+        )
+    tables = []
+    for tier in wanted:
+        annotators = {name: tiers[tier] for name, tiers in read.items()}
+        table = agreement_table(annotators, overlap=arguments.overlap, with_gamma=arguments.gamma)
+        table.insert(0, "tier", tier)
+        tables.append(table)
+        first, second = list(annotators.values())[:2]
+        seconds = confusion(frame_labels([first, second]))
+        print(f"{tier}")
+        shown = table.drop(columns="tier").dropna(axis=1, how="all")
+        print(shown.to_string(index=False, float_format=lambda number: f"{number:.2f}", na_rep=""))
+        print(f"seconds, {names[0]} down, {names[1]} across:")
+        print(seconds.to_string(float_format=lambda number: f"{number:.1f}" if number else "."))
+        print()
+        if arguments.output is not None:
+            _write_agreement(arguments.output, tier, annotators, seconds, modified_kappa(first, second).table)
+    if arguments.output is not None:
+        from signface.files import whole_file
+
+        with whole_file(arguments.output / "agreement.csv") as temporary:
+            pd.concat(tables, ignore_index=True).to_csv(temporary, index=False, float_format="%.4f")
+        print(f"{arguments.output}: tables and pictures")
+
+
+def _write_agreement(
+    folder: Path, tier: str, annotators: dict[str, pd.DataFrame], seconds: pd.DataFrame, matches: pd.DataFrame
+) -> None:
+    from signface.files import whole_file
+    from signface.report.agreement import draw_agreement
+    from signface.report.timeline import save_figure
+
+    stem = "".join(c if c.isalnum() or c in "-_@." else "_" for c in tier)
+    for kind, table in (("seconds", seconds.round(3)), ("annotations", matches)):
+        with whole_file(folder / f"confusion_{stem}_{kind}.csv") as temporary:
+            table.to_csv(temporary)
+    save_figure(draw_agreement(annotators, seconds, title=tier), folder / f"agreement_{stem}.png")
+
+
+def _names(files: list[Path]) -> list[str]:
+    """Short names that tell the files apart: their stems, or their paths where stems are equal."""
+    stems = [file.stem for file in files]
+    return stems if len(set(stems)) == len(stems) else [str(file) for file in files]
+
+
+def install_recogniser(arguments: argparse.Namespace) -> None:
+    """Write the extension folder and say what to do with it."""
+    from signface.elan.recogniser import extensions_folder, write_extension
+
+    folder = arguments.output if arguments.elan is None else extensions_folder(arguments.elan) / "signface"
+    write_extension(folder)
+    print(f"{folder}: written for {sys.executable}")
+    if arguments.elan is None:
+        print("Copy this folder into ELAN's extensions folder:")
+        print("  Linux    ELAN_x-x/lib/app/extensions")
+        print("  macOS    ELAN_x-x.app/Contents/app/extensions")
+        print("  Windows  ELAN_x-x\\app\\extensions")
+    print("Start ELAN again; signface is on the tab Recognizers > Video Recognizer.")
+
+
+def recognise(arguments: argparse.Namespace) -> int:
+    """Annotate one take for ELAN: parameters from standard input, progress to standard output, a tier file."""
+    from signface.elan.recogniser import DONE, FAILED
+
+    try:
+        _recognise(sys.stdin.buffer.read())
+    except SignfaceError as error:
+        print(f"signface: {error}", flush=True)
+        print(FAILED, flush=True)
+        return 2
+    except Exception:
+        print(FAILED, flush=True)  # ELAN waits for this line; the trace that follows goes into its report
+        raise
+    print(DONE, flush=True)
+    return 0
+
+
+def _recognise(xml: bytes) -> None:
+    from signface.annotation import annotate
+    from signface.cli.options import neutral_time
+    from signface.elan.recogniser import progress_line, read_parameters, write_tier_file
+    from signface.elan.tiers import affect_tier
+    from signface.face.layout_files import read_layout
+    from signface.face.reading import read_face
+    from signface.label.persistence import load_model
+    from signface.takes.reading import read_recording
+
+    chosen = read_parameters(xml)
+    for name, what in (("take", "recording"), ("tiers", "file for the tiers")):
+        if name not in chosen:
+            raise SignfaceError(f"no {what} was chosen", hint=f"choose it in the panel ({name})")
+    try:
+        neutral = neutral_time(chosen.get("neutral", "auto"))
+    except argparse.ArgumentTypeError as error:
+        raise SignfaceError(str(error), hint="write seconds, or auto") from error
+    print(progress_line(0.05, "reading"), flush=True)
+    recording = read_recording(Path(chosen["take"]))
+    face = read_face(chosen.get("face", "default"))
+    layout = read_layout(chosen["layout"], face) if "layout" in chosen else None
+    model = load_model(chosen.get("classifier", "default"))
+    print(progress_line(0.2, "solving"), flush=True)
+    found = annotate(recording, model=model, face=face, layout=layout, neutral=neutral)
+    print(progress_line(0.9, "writing"), flush=True)
+    tier = affect_tier(found.segments, chosen.get("signer", ""))
+    write_tier_file(chosen["tiers"], tier, with_dependents=("affect-confidence",))
+    from signface.annotation import summarise
+
+    print(f"INFO: {summarise(found)}", flush=True)

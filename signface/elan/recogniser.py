@@ -1,0 +1,217 @@
+"""The recogniser that ELAN itself runs: its extension folder, and the language it speaks.
+
+ELAN lists a recogniser for every folder in its `extensions` directory that holds a CMDI file. It starts the program
+named there in that folder with a bare environment, writes the chosen parameters to its standard input as XML, shows
+its progress lines, and reads the tier file that it was told to write (`LocalRecognizer`, `RecognizerParser` and
+`XmlTierIO` in ELAN's sources).
+
+- `write_extension`, `extensions_folder`: the folder, and where it belongs.
+- `read_parameters`: what ELAN writes to standard input.
+- `progress_line`, `DONE`, `FAILED`: what it reads from standard output.
+- `write_tier_file`: the file it imports.
+"""
+
+from __future__ import annotations
+
+import stat
+import sys
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+
+from lxml import etree
+
+from signface.elan.tiers import Tier
+from signface.errors import SignfaceError
+from signface.files import whole_file
+
+CMD = "http://www.clarin.eu/cmd/"
+
+DONE = "RESULT: DONE."
+FAILED = "RESULT: FAILED."
+
+#: Name and, for ELAN's panel, description of each input, in the order shown.
+INPUTS = (
+    ("video", "video", True, "The film that is open in ELAN (not needed for the result)"),
+    ("take", "auxiliary", False, "The recording of the face: C3D, TRC, TSV, CSV or .pose"),
+    ("face", "auxiliary", True, "A face model (.glb), if not the one that ships with signface"),
+    ("layout", "auxiliary", True, "A marker layout (.csv), if the shipped ones do not fit the markers"),
+    ("classifier", "auxiliary", True, "A trained classifier (.skops), if not the one that ships with signface"),
+)
+TEXTS = (
+    ("signer", "", "Names the tiers: affect@SIGNER"),
+    ("neutral", "auto", "Time of a frame with a neutral face in seconds, or auto"),
+)
+
+#: Where ELAN keeps its extensions, below its own folder, on Linux, macOS and Windows.
+PLACES = ("lib/app/extensions", "Contents/app/extensions", "app/extensions", "extensions")
+
+SHELL = """#!/bin/sh
+# Started by ELAN, without PATH and in the C locale.
+LC_ALL=C.UTF-8
+PYTHONUTF8=1
+export LC_ALL PYTHONUTF8
+exec {python} -m signface.cli.main elan recognise
+"""
+BATCH = """@echo off\r
+set PYTHONUTF8=1\r
+{python} -m signface.cli.main elan recognise\r
+"""
+HELP = """<!DOCTYPE html>
+<html><head><meta charset="utf-8"><title>signface</title></head><body>
+<h1>signface</h1>
+<p>Annotates the face of a motion-captured take: expressions held and the transitions between them, each with a
+confidence. Choose the recording (take); everything else has a default. The result is that of
+<code>signface annotate</code>.</p>
+<p>When it is done, ELAN offers to load the tiers. Progress and errors stand in the report.</p>
+</body></html>
+"""
+
+
+def extensions_folder(elan: str | PathLike[str]) -> Path:
+    """The folder of extensions of an ELAN installation.
+
+    Parameters
+    ----------
+    elan : path
+        The folder that ELAN was installed into (on macOS `ELAN.app`), or its folder of extensions itself.
+
+    Raises
+    ------
+    SignfaceError
+        There is no ELAN in the folder.
+    """
+    folder = Path(elan)
+    if folder.name == "extensions" and folder.is_dir():
+        return folder
+    for place in PLACES:
+        if (folder / place).is_dir():
+            return folder / place
+        if (folder / place).parent.is_dir() and place != "extensions":
+            return folder / place  # a new ELAN has the folder only once something is in it
+    raise SignfaceError(
+        "holds no ELAN", file=folder, hint="name the folder that has lib/app, app or Contents/app in it"
+    )
+
+
+def write_extension(folder: str | PathLike[str], *, python: str | None = None) -> list[Path]:
+    """Write the recogniser for this machine.
+
+    Parameters
+    ----------
+    folder : path
+        The extension's own folder, below ELAN's `extensions`.
+    python : str, optional
+        The interpreter that has signface; the running one by default.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+
+    Raises
+    ------
+    SignfaceError
+        The folder cannot be written.
+    """
+    program = sys.executable if python is None else python
+    place = Path(folder)
+    quoted = "'" + program.replace("'", "'\\''") + "'"
+    contents = {
+        "recognizer.cmdi": etree.tostring(cmdi(), xml_declaration=True, encoding="UTF-8", pretty_print=True),
+        "signface.sh": SHELL.format(python=quoted).encode(),
+        "signface.bat": BATCH.format(python=f'"{program}"').encode(),
+        "signface.html": HELP.encode(),
+    }
+    written = []
+    for name, content in contents.items():
+        with whole_file(place / name) as temporary:
+            temporary.write_bytes(content)
+        written.append(place / name)
+    script = place / "signface.sh"
+    script.chmod(script.stat().st_mode | stat.S_IXUSR | stat.S_IXGRP | stat.S_IXOTH)
+    return written
+
+
+def cmdi() -> etree._Element:
+    """The description that ELAN reads.
+
+    ELAN splits the command at spaces, so it names a script in its own folder and no path. It drops a parameter
+    without `info`, and shows a recogniser on the panel of video recognisers only when an input is a video.
+    """
+    root = etree.Element(f"{{{CMD}}}CMD", nsmap={None: CMD}, CMDVersion="1.1")
+    etree.SubElement(root, f"{{{CMD}}}Header")
+    resources = etree.SubElement(root, f"{{{CMD}}}Resources")
+    for name in ("ResourceProxyList", "JournalFileProxyList", "ResourceRelationList"):
+        etree.SubElement(resources, f"{{{CMD}}}{name}")
+    recogniser = etree.SubElement(etree.SubElement(root, f"{{{CMD}}}Components"), f"{{{CMD}}}RECOGNIZER")
+
+    def add(tag: str, text: str, **attributes: str) -> None:
+        etree.SubElement(recogniser, f"{{{CMD}}}{tag}", attributes).text = text
+
+    add(
+        "recognizer",
+        "signface",
+        recognizerType="local",
+        runLinux="./signface.sh",
+        runMac="./signface.sh",
+        runWin="cmd /c signface.bat",
+        info="signface: facial expressions from motion capture",
+    )
+    add("documentation", "signface.html")
+    for name, kind, optional, info in INPUTS:
+        add("input", name, type=kind, level="basic", optional="true" if optional else "false", info=info)
+    for name, default, info in TEXTS:
+        add("textparam", name, default=default, level="basic", info=info)
+    add("output", "tiers", type="tier", level="basic", optional="false", info="The tiers found")
+    return root
+
+
+def read_parameters(xml: bytes) -> dict[str, str]:
+    """The parameters that ELAN writes to standard input: name and value, those left empty not among them.
+
+    Raises
+    ------
+    SignfaceError
+        The text is not what ELAN writes.
+    """
+    parser = etree.XMLParser(resolve_entities=False, no_network=True)
+    try:
+        root = etree.fromstring(xml.strip(), parser)
+    except etree.XMLSyntaxError as error:
+        raise SignfaceError(
+            "what came in on standard input is no list of parameters", hint="this command is run by ELAN"
+        ) from error
+    if root.tag != "PARAM":
+        raise SignfaceError(f"expected PARAM on standard input, not {root.tag}", hint="this command is run by ELAN")
+    values = {str(item.get("name")): (item.text or "").strip() for item in root.iterfind("param")}
+    return {name: value for name, value in values.items() if value}
+
+
+def progress_line(share: float, what: str) -> str:
+    """A line that ELAN shows as progress: `PROGRESS: 0.4 solving`."""
+    return f"PROGRESS: {share:.2f} {what}"
+
+
+def write_tier_file(path: str | PathLike[str], tier: Tier, *, with_dependents: Sequence[str] = ()) -> None:
+    """Write a tier, and dependents of it by channel, as the file that ELAN imports.
+
+    Names of tiers stand in one attribute, parted by spaces, so a space in a name becomes `_`. ELAN reads seconds as
+    32-bit numbers and cuts them to milliseconds, which would turn 1.234 s into 1233 ms: 0.4 ms are added.
+
+    Raises
+    ------
+    SignfaceError
+        The folder cannot be written.
+    """
+    dependents = [child for child in tier.dependents if child.channel in with_dependents]
+    suffix = tier.name.removeprefix(tier.channel)
+    names = [tier.name, *(child.channel + suffix for child in dependents)]
+    root = etree.Element("TIER", columns=" ".join(name.replace(" ", "_") for name in names))
+    for number, (start, end, value) in enumerate(zip(tier.start_ms, tier.end_ms, tier.values)):
+        span = etree.SubElement(root, "span", start=f"{start / 1000 + 0.0004:.4f}", end=f"{end / 1000 + 0.0004:.4f}")
+        etree.SubElement(span, "v").text = value
+        for child in dependents:
+            etree.SubElement(span, "v").text = child.values[number] or ""
+    with whole_file(path) as temporary:
+        etree.ElementTree(root).write(str(temporary), xml_declaration=True, encoding="UTF-8", pretty_print=True)
