@@ -69,6 +69,28 @@ def test_a_c3d_file_without_points_is_refused(tmp_path, capsys):
     assert "no points" in refusal(file, capsys)
 
 
+@pytest.mark.parametrize(
+    ("parameter", "offset", "value"),
+    [
+        (b"LABELS", 3, 0),  # text without a dimension
+        (b"USED", 2, 255),  # a number declared as text
+        (b"USED", 2, 1),  # a number of one byte
+        (b"RATE", 3, 200),  # two hundred dimensions
+        (b"SCALE", 2, 9),  # no type
+        (b"UNITS", 0, 255),  # the next parameter lies elsewhere
+    ],
+)
+def test_a_c3d_file_whose_parameters_contradict_themselves_is_refused_before_it_can_do_harm(
+    parameter, offset, value, tmp_path, capsys
+):
+    file = tmp_path / "harm.c3d"
+    write_c3d(TAKE, file)
+    content = bytearray(file.read_bytes())
+    content[content.index(parameter) + len(parameter) + offset] = value
+    file.write_bytes(content)
+    assert "damaged C3D file" in refusal(file, capsys)
+
+
 @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan])
 def test_a_c3d_file_without_a_rate_is_refused(rate, tmp_path, capsys):
     file = tmp_path / "rate.c3d"

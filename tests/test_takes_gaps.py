@@ -53,6 +53,16 @@ def test_a_filled_path_joins_its_ends_without_a_step():
         assert steps[[begin - 1, end - 1]].max() < 1.5 * steps[begin - 100 : begin - 1].max()
 
 
+def test_a_marker_that_slips_while_unseen_is_led_from_its_old_place_to_its_new_one():
+    truth, _ = moving_face(10.0, 200.0, seed=8)
+    positions = truth.positions.copy()
+    begin, end = 900, 980
+    positions[end:, 1] += (6.0, 0.0, 0.0)
+    filled = fill_gaps(with_gaps(truth.changed("slip", positions=positions), {1: (begin, end)})).positions[:, 1]
+    assert np.linalg.norm(filled[begin] - positions[begin, 1]) < 0.5
+    assert np.linalg.norm(filled[end - 1] - positions[end - 1, 1] - (6.0, 0.0, 0.0)) < 0.5
+
+
 def test_gaps_that_are_too_long_or_at_the_ends_stay():
     truth, _ = moving_face(4.0, 100.0)
     filled = fill_gaps(with_gaps(truth, {0: (0, 10), 1: (100, 170), 2: (390, 400), 3: (100, 120)}))

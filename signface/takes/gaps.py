@@ -11,7 +11,7 @@ import warnings
 import numpy as np
 
 from signface.errors import SignfaceError
-from signface.takes.rigid import apply, inverse, rigid_transforms
+from signface.takes.rigid import apply, flatness, inverse, rigid_transforms
 from signface.takes.runs import runs
 from signface.takes.take import Take
 
@@ -23,6 +23,9 @@ SUPPORT_S = 0.04
 
 #: How many neighbours carry a marker over a gap, and how many frames they are learnt from.
 NEIGHBOURS, TRAINING_FRAMES = 6, 300
+
+#: Markers nearer than this to one line (root mean square, mm) do not carry a head.
+FLATTEST_MM = 5.0
 
 #: Weight of the ridge in the neighbours' regression, in square millimetres a frame: the size of the markers' jitter.
 RIDGE_MM2 = 0.05
@@ -75,11 +78,12 @@ class _Carriers:
 
     def __init__(self, positions: np.ndarray) -> None:
         known = np.isfinite(positions[..., 0])
-        rest = positions[np.argmax(known.sum(axis=1))]
-        weights = (known & np.isfinite(rest[:, 0])).astype(float)
-        self.poses = rigid_transforms(np.nan_to_num(rest), positions, weights)
-        self.poses[weights.sum(axis=1) < 3] = np.nan
-        self.places = apply(inverse(self.poses), positions)  # (F, M, 3) in the head
+        self.positions = positions
+        self.rest = positions[np.argmax(known.sum(axis=1))]
+        weights = (known & np.isfinite(self.rest[:, 0])).astype(float)
+        poses = rigid_transforms(np.nan_to_num(self.rest), positions, weights)
+        poses[weights.sum(axis=1) < 3] = np.nan
+        self.places = apply(inverse(poses), positions)  # (F, M, 3) in the head
         self.known = np.isfinite(self.places[..., 0])
         sample = self.places[:: max(1, len(positions) // 200)]
         middle = np.nanmedian(sample, axis=0)
@@ -106,12 +110,20 @@ class _Carriers:
         normal = (train - middle).T @ (train - middle)
         normal[np.diag_indices_from(normal)] += RIDGE_MM2 * len(together)
         slopes = np.linalg.solve(normal, (train - middle).T @ (own - own_middle))
-        over = self.places[window][:, carriers].reshape(end - begin + 2, -1)
+        # Over the gap the pose comes from one set of markers: it would jump where a marker comes or goes.
+        steady = self.known[window].all(axis=0) & np.isfinite(self.rest[:, 0])
+        steady[marker] = False
+        if flatness(self.rest, steady[None])[0] < FLATTEST_MM:
+            return None
+        recorded = self.positions[window]
+        poses = rigid_transforms(self.rest[steady], recorded[:, steady], np.ones((len(recorded), steady.sum())))
+        back = inverse(poses)
+        over = apply(back, recorded[:, carriers]).reshape(len(recorded), -1)
         predicted = own_middle + (over - middle) @ slopes
-        errors = self.places[[begin - 1, end], marker] - predicted[[0, -1]]
+        errors = apply(back[[0, -1]], recorded[[0, -1], marker][:, None])[:, 0] - predicted[[0, -1]]
         part = np.linspace(0.0, 1.0, end - begin + 2)[:, None]
         joined = predicted + (1 - part) * errors[0] + part * errors[1]  # a line in time joins the known ends
-        return apply(self.poses[begin:end], joined[1:-1, None])[:, 0]
+        return apply(poses[1:-1], joined[1:-1, None])[:, 0]
 
 
 def fill_gaps(take: Take, *, short_s: float = SHORT_S, long_s: float = LONG_S) -> Take:
