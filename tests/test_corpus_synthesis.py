@@ -108,7 +108,7 @@ def test_an_utterance_is_signed_three_times_with_its_affects():
 def test_recordings_come_back_from_c3d_in_millimetres(mini):
     for job in plan_mini():
         made = make_take(job).take
-        read = read_take(mini / job.signer_name / f"{job.name}.c3d")
+        read = read_take(mini / f"{job.name}.c3d")
         assert read.labels == made.labels
         assert read.rate == made.rate == RATE
         np.testing.assert_array_equal(np.isnan(read.positions), np.isnan(made.positions))

@@ -248,11 +248,14 @@ def make_take(job: Job, spread: Spread | None = None) -> SyntheticTake:
 
 
 def write_take(folder: Path, job: Job, made: SyntheticTake) -> TakeEntry:
-    """Write a take (`SIGNER/NAME.c3d`), its annotation beside it, and the truth about it under `truth/`."""
-    recording = folder / job.signer_name / f"{job.name}.c3d"
+    """Write a take (`NAME.c3d`), its annotation under `reference/` and the truth about it under `truth/`.
+
+    The annotation does not stand beside the recording: that is where `signface annotate` puts its own.
+    """
+    recording = folder / f"{job.name}.c3d"
     with whole_file(recording) as temporary:
         write_c3d(made.take, temporary)
-    annotation = recording.with_suffix(".eaf")
+    annotation = annotation_of(folder, job)
     write_eaf(
         annotation,
         made.reference,
@@ -265,6 +268,11 @@ def write_take(folder: Path, job: Job, made: SyntheticTake) -> TakeEntry:
     write_weights(made.weights, truth.with_suffix(".signer.parquet"))
     write_segments(made.borders, truth.with_suffix(".segments.csv"))
     return TakeEntry(recording, job.signer_name, job.kind, annotation, made.neutral_s)
+
+
+def annotation_of(folder: Path, job: Job) -> Path:
+    """Where the reference annotation of a take stands."""
+    return folder / "reference" / f"{job.name}.eaf"
 
 
 def write_c3d(take: Take, path: str | PathLike[str]) -> None:
@@ -354,7 +362,7 @@ def _make_sure_it_is_ours(folder: Path, settings: dict, jobs: list[Job]) -> None
     if previous != json.loads(json.dumps(settings)):
         raise SignfaceError("holds a corpus made with other settings", file=folder, hint=elsewhere)
     for job in jobs:
-        annotation = folder / job.signer_name / f"{job.name}.eaf"
+        annotation = annotation_of(folder, job)
         if annotation.exists() and not is_unmodified_output(read_document(annotation).getroot()):
             raise SignfaceError(
                 "was corrected since it was made", file=annotation, hint=f"{elsewhere}, or move it away first"

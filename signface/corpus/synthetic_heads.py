@@ -27,8 +27,26 @@ SHAPE_RMS_MM = (4.0, 6.0)
 #: Where the jaw turns, on the default face: the axis through both joints, just before the ears (y and z, mm). The
 #: rotation that fits `jawOpen` best turns about y = -2, z = 18.
 HINGE_YZ_MM = (0.0, 15.0)
-#: Bases that move the lower jaw about its hinge.
+#: The base that moves the lower jaw about its hinge.
 JAW = "jawOpen"
+#: Single features that are not drawn: crooked ones, ears, wrinkles, the head's size or posture, a frown at rest.
+LEFT_OUT = (
+    "macro-",
+    "asym-",
+    "l-ear",
+    "r-ear",
+    "chin-cleft",
+    "chin-triangle",
+    "head-age",
+    "head-angle",
+    "head-back",
+    "head-scale",
+    "mouth-angles",
+    "mouth-trans-in",
+    "mouth-trans-out",
+    "nose-trans-in",
+    "nose-trans-out",
+)
 
 
 @dataclass(frozen=True)
@@ -113,7 +131,7 @@ def draw_head(avatar: FaceModel, identities: np.ndarray, names: tuple[str, ...],
     ----------
     avatar : FaceModel
     identities : (K, V, 3) array
-        Changes of shape on the avatar's topology.
+        Changes of shape on the avatar's topology (`signface.face.reading.read_identities`).
     names : (K,) tuple of str
         Their names; `l-` and `r-` open the names of the two sides of one change.
     rng : numpy Generator
@@ -171,26 +189,59 @@ def _draw_couplings(
 def draw_shape(
     avatar: FaceModel, identities: np.ndarray, names: tuple[str, ...], rng: np.random.Generator
 ) -> np.ndarray:
-    """(V, 3) another head: a random mixture of identity shapes, scaled to lie `SHAPE_RMS_MM` from the avatar.
+    """(V, 3) another head: a few features of its own, and as much of a sex, an age and ancestries as it takes to lie
+    `SHAPE_RMS_MM` from the avatar.
 
     The distance is taken over the skin that the bases move, after the best rigid alignment: a head that only sits
-    elsewhere is no other head.
+    elsewhere is no other head. Features are not scaled: twice a hooked nose is a caricature.
     """
-    amounts: dict[str, float] = {}
-    for name in names:
-        pair = name[2:] if name[:2] in ("l-", "r-") else name
-        if pair not in amounts:
-            amounts[pair] = float(np.clip(abs(rng.normal(0.0, 0.5)), 0.0, 1.0)) if rng.random() < 0.35 else 0.0
-    own = np.array([amounts[name[2:] if name[:2] in ("l-", "r-") else name] for name in names])
-    own = own * np.clip(rng.normal(1.0, 0.15, len(names)), 0.5, 1.5)  # no face is quite symmetric
-    change = np.tensordot(own, identities, axes=1)
+    rest, moving = avatar.mesh.vertices, avatar.moving
+    person = np.tensordot(_person(names, rng), identities, axes=1)
+    features = np.tensordot(_features(names, rng), identities, axes=1)
     target = rng.uniform(*SHAPE_RMS_MM)
-    factor = 1.0
-    for _ in range(6):
-        aligned = _aligned(avatar.mesh.vertices + factor * change, avatar.mesh.vertices, avatar.moving)
-        rms = np.sqrt(((aligned - avatar.mesh.vertices)[avatar.moving] ** 2).sum(axis=1).mean())
-        factor *= target / rms
-    return _aligned(avatar.mesh.vertices + factor * change, avatar.mesh.vertices, avatar.moving)
+    low, high = 0.0, 3.0
+    for _ in range(20):
+        factor = 0.5 * (low + high)
+        shape = _aligned(rest + features + factor * person, rest, moving)
+        rms = np.sqrt(((shape - rest)[moving] ** 2).sum(axis=1).mean())
+        low, high = (factor, high) if rms < target else (low, factor)
+    return shape
+
+
+def _person(names: tuple[str, ...], rng: np.random.Generator) -> np.ndarray:
+    """(K,) somewhat a woman or a man, no longer young, of mixed ancestry."""
+    amounts = dict.fromkeys(names, 0.0)
+    amounts[str(rng.choice(["macro-female", "macro-male"]))] = rng.uniform(0.2, 0.8)
+    ancestries = ["macro-african", "macro-asian", "macro-caucasian"]
+    amounts.update(zip(ancestries, 0.7 * rng.dirichlet(np.full(3, 0.7))))
+    amounts["macro-old"] = rng.uniform(0.0, 0.25)
+    return np.array([amounts[name] for name in names])
+
+
+def _features(names: tuple[str, ...], rng: np.random.Generator) -> np.ndarray:
+    """(K,) how much of each single feature.
+
+    Shapes that oppose each other (`-incr` and `-decr`, `-up` and `-down`) exclude each other; both sides of a face get
+    nearly the same.
+    """
+    amounts = dict.fromkeys(names, 0.0)
+    ways: dict[str, list[str]] = {}
+    for name in names:
+        if not name.startswith(LEFT_OUT):
+            ways.setdefault(_sideless(name).rpartition("-")[0], []).append(name)
+    for feature in ways.values():
+        if rng.random() < 0.4:
+            way = _sideless(str(rng.choice(feature)))
+            amount = min(abs(rng.normal(0.0, 0.22)), 0.4)
+            for name in feature:
+                if _sideless(name) == way:
+                    amounts[name] = amount * np.clip(rng.normal(1.0, 0.2), 0.5, 1.5)  # no face is quite symmetric
+    return np.array([amounts[name] for name in names])
+
+
+def _sideless(name: str) -> str:
+    """The name of an identity shape without its side."""
+    return name.removeprefix("l-").removeprefix("r-")
 
 
 def _aligned(points: np.ndarray, reference: np.ndarray, mask: np.ndarray) -> np.ndarray:
