@@ -62,6 +62,12 @@ def test_a_take_of_another_marker_set_is_refused_with_the_names():
     assert "Choose the layout" in line
 
 
+def test_a_take_with_a_small_part_of_a_large_layout_is_renamed():
+    layout = [str(number) for number in range(468)]
+    contours = layout[::4]
+    assert rename_to(take_of(contours), layout).labels == tuple(contours)
+
+
 def test_unlabelled_points_have_no_label():
     kept, names, notes = clean_labels(["*1", "A", "Anna:*12", "", "unlabeled_7", "U_3", "B", "Unnamed"])
     assert kept == [1, 6]

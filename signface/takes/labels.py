@@ -17,8 +17,9 @@ from signface.takes.take import Take
 #: Names that tracking software gives to points nobody has labelled: `*12`, `U_3`, `Unlabeled 7`, or nothing at all.
 UNLABELLED = re.compile(r"^$|^\*\d*$|^U_?\d+$|^(un(labell?ed|named|identified))[\s_-]*\d*$", re.IGNORECASE)
 
-#: A take with fewer than this part of a layout's markers is not a take of that layout.
-SMALLEST_MATCH = 1 / 3
+#: A take with fewer than this part of a layout's markers is not a take of that layout, unless the layout knows at least
+#: half of the take's markers (the 128 contour points of MediaPipe's 468).
+SMALLEST_MATCH, KNOWN_MARKERS = 1 / 3, 1 / 2
 
 
 def stripped(label: str) -> str:
@@ -124,7 +125,8 @@ def rename_to(take: Take, labels: Sequence[str]) -> Take:
     Raises
     ------
     SignfaceError
-        Fewer than a third of the labels (or fewer than three) are in the take: it was recorded with another set.
+        Fewer than three of the labels are in the take, or fewer than a third of them and fewer than half of the
+        take's own: it was recorded with another set.
 
     Examples
     --------
@@ -135,7 +137,8 @@ def rename_to(take: Take, labels: Sequence[str]) -> Take:
     found = match_labels(take.labels, labels)
     missing = [label for label in labels if label not in found]
     spare = [label for label in take.labels if label not in set(found.values())]
-    if len(found) < min(3, len(labels)) or len(found) < SMALLEST_MATCH * len(labels):
+    enough = min(SMALLEST_MATCH * len(labels), KNOWN_MARKERS * len(take.labels))
+    if len(found) < max(min(3, len(labels)), enough):
         names = ", ".join(spare[:5]) + (" ..." if len(spare) > 5 else "")
         raise SignfaceError(
             f"only {len(found)} of the layout's {len(labels)} markers are in the take: "
