@@ -79,7 +79,8 @@ def write_face(face: FaceModel, path: str | PathLike[str]) -> None:
     """Write a face as `.glb`: one mesh of one primitive in millimetres, one sparse morph target for each base.
 
     Positions are float32 (errors below 1e-4 mm on a head). The mesh's `extras` hold `targetNames` and
-    `unit: "mm"`; its node scales by 0.001, so that other programs see glTF's metres. The bytes depend on the face alone.
+    `unit: "mm"`; its node scales by 0.001, so that other programs see glTF's metres. The bytes depend on the face
+    alone.
 
     Raises
     ------
@@ -255,7 +256,8 @@ def _face_of(gltf: Any, file: Path) -> RawFace:
         vertices.append(own)
         bases.append(moved)
         painted = getattr(primitive.attributes, "COLOR_0", None)
-        colours.append(None if painted is None else _accessor(gltf, painted, file)[:, :3])
+        if painted is not None:
+            colours.append(_accessor(gltf, painted, file)[:, :3])
         triangles.append(corners.reshape(-1, 3) + offset)
         offset += len(own)
     extras = mesh.extras if isinstance(mesh.extras, dict) else {}
@@ -274,7 +276,7 @@ def _face_of(gltf: Any, file: Path) -> RawFace:
         all_bases,
         tuple(map(str, names)),
         unit,
-        colours=None if any(own is None for own in colours) else np.concatenate(colours),
+        colours=np.concatenate(colours) if len(colours) == len(vertices) else None,
     )
 
 

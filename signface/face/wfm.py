@@ -78,7 +78,8 @@ def _units(lines: list[str], vertices: int) -> tuple[np.ndarray, tuple[str, ...]
     if not numbers:
         return np.zeros((0, vertices, 3)), ()
     total = int(numbers[0].split()[0])
-    units, names = [], []
+    units: list[np.ndarray] = []
+    names: list[str] = []
     name = ""
     position = lines.index(numbers[0]) + 1
     while len(units) < total:

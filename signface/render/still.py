@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from signface.face.mesh import Mesh
+from signface.face.model import FaceModel
+from signface.face.reading import read_parts
 
 SKIN = (0.85, 0.68, 0.58)
 
@@ -75,7 +77,7 @@ def fragments(corners: np.ndarray, width: int, height: int) -> tuple[np.ndarray,
     sizes = 2 ** np.arange(int(np.ceil(np.log2(max(span.max(initial=1), 1)))) + 1)
     for smaller, size in zip([0, *sizes[:-1]], sizes):
         some = np.flatnonzero((span > smaller) & (span <= size))
-        for chunk in np.array_split(some, max(1, len(some) * size * size // 2_000_000)):
+        for chunk in np.array_split(some, max(1, int(len(some) * size * size // 2_000_000))):
             step = np.arange(size)
             column = low[chunk, 0, None, None] + step[None, None, :]
             row = low[chunk, 1, None, None] + step[None, :, None]
@@ -139,3 +141,69 @@ def render(mesh: Mesh, camera: Camera, colours: np.ndarray, background: float = 
     shaded = np.einsum("gk,gkd->gd", weight, np.asarray(colours)[corners]) * light[:, None] + shine[:, None]
     picture[pixel] = np.clip(shaded, 0.0, 1.0)
     return picture.reshape(camera.size[1], samples, camera.size[0], samples, 3).mean(axis=(1, 3))
+
+
+def draw_face(
+    face: FaceModel,
+    weights: np.ndarray | None = None,
+    *,
+    yaw: float = 0.0,
+    pitch: float = 0.0,
+    size: tuple[int, int] = (500, 600),
+    samples: int = 2,
+) -> np.ndarray:
+    """A picture of a face.
+
+    Parameters
+    ----------
+    face : FaceModel
+        With the default face, its eyes, teeth and mouth are drawn too.
+    weights : (N,) array, optional
+        By default the neutral.
+    yaw, pitch : float
+        Where it is seen from, as for `Camera`.
+    size : (int, int)
+        Width and height in pixels.
+    samples : int
+        Samples per pixel and axis.
+
+    Returns
+    -------
+    (height, width, 3) float array
+
+    Examples
+    --------
+    >>> from signface.face.reading import read_face
+    >>> draw_face(read_face("default"), size=(50, 60)).shape
+    (60, 50, 3)
+    """
+    mesh, colours = whole_mesh(face, weights)
+    return render(mesh, face_camera(face, yaw=yaw, pitch=pitch, size=size), colours, samples=samples)
+
+
+def whole_mesh(face: FaceModel, weights: np.ndarray | None = None) -> tuple[Mesh, np.ndarray]:
+    """The posed skin with its colours (V, 3), and what else ships with the default face."""
+    weights = np.zeros(face.n_bases) if weights is None else np.asarray(weights, dtype=np.float64)
+    colours = np.tile(SKIN, (len(face.mesh.vertices), 1)) if face.colours is None else np.asarray(face.colours)
+    skin = Mesh(face.pose(weights), face.mesh.triangles)
+    if face.name != "default":
+        return skin, colours
+    parts = read_parts()
+    assert parts.colours is not None
+    if parts.names != face.names:
+        return skin, colours
+    together = Mesh(
+        np.concatenate([skin.vertices, parts.pose(weights)]),
+        np.concatenate([skin.triangles, parts.mesh.triangles + len(skin.vertices)]),
+    )
+    return together, np.concatenate([colours, parts.colours])
+
+
+def face_camera(
+    face: FaceModel, *, yaw: float = 0.0, pitch: float = 0.0, size: tuple[int, int] = (500, 600), margin: float = 1.45
+) -> Camera:
+    """A camera that shows the part of a face that its bases move, and `margin` times as much around it."""
+    moving = face.moving if face.moving.any() else np.ones(len(face.mesh.vertices), bool)
+    low, high = face.mesh.vertices[moving].min(axis=0), face.mesh.vertices[moving].max(axis=0)
+    extent = margin * max(high[1] - low[1], (high[0] - low[0]) * size[1] / size[0])
+    return Camera((low + high) / 2, float(extent), yaw, pitch, size)
