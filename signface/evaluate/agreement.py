@@ -331,4 +331,5 @@ def agreement_table(
                 "gamma": gamma(tables, seed=seed) if with_gamma else float("nan"),
             }
         )
-    return pd.DataFrame(rows)
+    table = pd.DataFrame(rows)
+    return table.astype({"matched": "Int64"}) if len(table) else table
