@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
-from signface.elan.export import write_eaf
+from signface.elan.export import write_eaf, write_into
 from signface.elan.reference import read_reference
 from signface.errors import SignfaceError
 from tests.elan_files import labelled
@@ -148,3 +150,30 @@ def test_several_signers_ask_for_one(tmp_path):
 def test_our_own_files_are_read_without_naming_the_signer(tmp_path):
     write_eaf(tmp_path / "take.eaf", labelled(), signer="S1")
     assert len(read_reference(tmp_path / "take.eaf")) == 5
+
+
+@settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_damaged_files_are_read_or_refused_in_one_line(tmp_path, data):
+    whole = OLD.format(version="3.0", tier="affect", intensity="intensity", second="NJ").encode()
+    cut = data.draw(st.integers(0, len(whole)))
+    junk = data.draw(st.binary(max_size=8))
+    path = tmp_path / "damaged.eaf"
+    damaged = whole[:cut] + junk + whole[cut + data.draw(st.integers(0, 40)) :]
+    path.write_bytes(damaged)
+    for attempt in (lambda: read_reference(path), lambda: write_into(path, labelled(), signer="S9")):
+        refused = None
+        try:
+            attempt()
+        except SignfaceError as error:
+            refused = str(error)
+        if refused is not None:
+            assert "\n" not in refused
+            assert path.read_bytes() == damaged
+
+
+def test_reading_does_not_change_a_file(tmp_path):
+    path = write_old(tmp_path / "old.eaf")
+    before = path.read_bytes()
+    read_reference(path)
+    assert path.read_bytes() == before
