@@ -22,7 +22,7 @@ from signface.segment.segments import Segments
 if TYPE_CHECKING:
     from signface.face.layout import MarkerLayout
     from signface.face.model import FaceModel
-    from signface.label.persistence import TrainedModel
+    from signface.label.model import TrainedModel
     from signface.takes.take import Take
 
 

@@ -5,10 +5,17 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from signface.cli.options import add_solve_arguments, output_files, read_face_and_layout
 from signface.cli.progress import progress
 from signface.errors import SignfaceError
+
+if TYPE_CHECKING:
+    from signface.annotation import Annotation
+    from signface.face.layout import MarkerLayout
+    from signface.face.model import FaceModel
+    from signface.label.model import TrainedModel
 
 EXAMPLE = """  signface annotate take.c3d -o take.eaf
   signface annotate recordings/*.c3d -o annotated/ --signer S1"""
@@ -26,7 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--signer", default="", metavar="NAME", help="names the tiers: affect@NAME")
     parser.add_argument("--video", type=Path, metavar="FILE", help="film of the take, linked in the .eaf")
-    parser.add_argument("--figure", action="store_true", help="also draw each take's timeline (TAKE.png)")
+    parser.add_argument(
+        "--figure", action="store_true", help="also draw the face and the timeline of each take (TAKE.png)"
+    )
     parser.add_argument(
         "--replace", action="store_true", help="overwrite .eaf files that were worked in (the old one is kept)"
     )
@@ -58,7 +67,15 @@ def run(arguments: argparse.Namespace) -> int:
     return 2 if failed else 0
 
 
-def annotate_file(take: Path, file: Path, arguments: argparse.Namespace, *, face, layout, model) -> None:
+def annotate_file(
+    take: Path,
+    file: Path,
+    arguments: argparse.Namespace,
+    *,
+    face: FaceModel,
+    layout: MarkerLayout | None,
+    model: TrainedModel,
+) -> None:
     """Annotate one recording into one .eaf and say what was found."""
     from signface.annotation import annotate, summarise, write_annotation
     from signface.takes.reading import read_recording
@@ -74,7 +91,16 @@ def annotate_file(take: Path, file: Path, arguments: argparse.Namespace, *, face
     )
     write_annotation(found, file, signer=arguments.signer, video=arguments.video, replace=arguments.replace)
     if arguments.figure:
-        from signface.report.timeline import draw_timeline, save_figure
-
-        save_figure(draw_timeline(found.descriptors, found.segments), file.with_suffix(".png"))
+        save_picture(found, face, file.with_suffix(".png"))
     print(f"{file}: {summarise(found)}")
+
+
+def save_picture(found: Annotation, face: FaceModel, path: Path) -> None:
+    """Draw a take in one picture; its timeline only, where its weights are not this face's."""
+    from signface.report.overview import draw_overview
+    from signface.report.timeline import draw_timeline, save_figure
+
+    if found.descriptors.names == face.names:
+        save_figure(draw_overview(found.descriptors, found.segments, face), path)
+    else:
+        save_figure(draw_timeline(found.descriptors, found.segments), path)

@@ -20,23 +20,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Annotate the bundled takes into a folder, with a figure of each."""
     from signface.annotation import annotate, summarise, write_annotation
+    from signface.cli.annotate import save_picture
     from signface.cli.progress import progress
     from signface.corpus.manifest import read_corpus
+    from signface.face.reading import read_face
     from signface.files import bundled_corpus
     from signface.label.persistence import load_model
-    from signface.report.timeline import draw_timeline, save_figure
     from signface.takes.reading import read_recording
 
     corpus = read_corpus(bundled_corpus())
-    model = load_model("default")
+    model, face = load_model("default"), read_face("default")
     found = []
     for entry in progress(corpus.takes, "annotating"):
         file = arguments.output / f"{entry.path.stem}.eaf"
         annotation = annotate(
-            read_recording(entry.path), model=model, neutral="auto" if entry.neutral_s is None else entry.neutral_s
+            read_recording(entry.path),
+            model=model,
+            face=face,
+            neutral="auto" if entry.neutral_s is None else entry.neutral_s,
         )
         written = write_annotation(annotation, file, signer=entry.signer, replace=True)
-        save_figure(draw_timeline(annotation.descriptors, annotation.segments), file.with_suffix(".png"))
+        save_picture(annotation, face, file.with_suffix(".png"))
         found.append((written[0], annotation))
     if not found:
         raise SignfaceError("no take ships with this copy of signface", hint="use a checkout of the project")

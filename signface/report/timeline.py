@@ -1,6 +1,6 @@
 """A take at a glance: its energy curves above its labelled segments (seed 001, figure 4.3).
 
-- `draw_timeline`: the figure.
+- `draw_timeline`: the figure; `draw_timeline_on`: on a part of another.
 - `save_figure`: any figure to a file, whole or not at all.
 """
 
@@ -10,8 +10,6 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.report.colours import colour_of, ink_on
@@ -19,7 +17,7 @@ from signface.segment.segments import Segments
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
 
 def draw_timeline(
@@ -49,11 +47,23 @@ def draw_timeline(
     """
     from matplotlib.figure import Figure
 
+    figure = Figure(figsize=(10, 3.1 if reference is None else 3.6), layout="constrained")
+    draw_timeline_on(figure, descriptors, segments, reference, title)
+    return figure
+
+
+def draw_timeline_on(
+    figure: Figure | SubFigure,
+    descriptors: Descriptors,
+    segments: Segments,
+    reference: Segments | None = None,
+    title: str | None = None,
+) -> None:
+    """Draw the timeline on a figure, or on a part of one; see `draw_timeline`."""
     from signface.segment.energy import energies
 
     rows = [("automatic", segments)] if reference is None else [("automatic", segments), ("reference", reference)]
     curves = energies(descriptors)
-    figure = Figure(figsize=(10, 2.6 + 0.5 * len(rows)), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[3, 0.8 * len(rows)])
     above.plot(curves.time, curves.velocity, color="#0a7e8c", lw=1.3, label="velocity energy (1/s)")
     above.plot(
@@ -66,8 +76,8 @@ def draw_timeline(
     for row in segments.table.itertuples():
         if row.kind == "transition":
             above.axvspan(row.start_s, row.end_s, color="#000000", alpha=0.06, lw=0)
-    above.set_ylim(bottom=0)
     above.set_title(title or descriptors.name, loc="left", fontsize=11)
+    above.set_ylim(0, 1.18 * above.get_ylim()[1])  # room for the legend
     above.legend(loc="upper right", fontsize=8, frameon=False, ncols=2)
     for position, (_, row_segments) in enumerate(reversed(rows)):
         _draw_segments(below, row_segments, position)
@@ -78,7 +88,6 @@ def draw_timeline(
     for axes in (above, below):
         axes.spines[["top", "right"]].set_visible(False)
     below.tick_params(axis="y", length=0)
-    return figure
 
 
 def _draw_segments(axes: Axes, segments: Segments, position: int) -> None:
@@ -115,10 +124,3 @@ def save_figure(figure: Figure, path: str | PathLike[str], *, dpi: int = 150) ->
         raise SignfaceError("the ending of a figure is .png, .svg or .pdf", file=path)
     with whole_file(path) as temporary, mpl.rc_context({"svg.hashsalt": "signface"}):
         figure.savefig(temporary, dpi=dpi, metadata=undated[suffix])
-
-
-def shares(segments: Segments) -> dict[str, float]:
-    """Seconds of each label of the stable segments, the longest first."""
-    stable = segments.table[segments.table["kind"] == "stable"]
-    seconds = (stable["end_s"] - stable["start_s"]).groupby(stable["label"]).sum()
-    return {str(label): float(np.round(value, 3)) for label, value in seconds.sort_values(ascending=False).items()}
