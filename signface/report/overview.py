@@ -53,8 +53,7 @@ def draw_overview(
 
     frames = telling_frames(descriptors, segments, moments)
     figure = Figure(figsize=(10, 6.4), layout="constrained")
-    parts = np.ravel(figure.subfigures(2, 1, height_ratios=[1.05, 1]))
-    faces, below = parts[0], parts[1]
+    faces, below = figure.subfigures(2, 1, squeeze=False, height_ratios=[1.05, 1])[:, 0]
     draw_timeline_on(below, descriptors, segments, reference, title)
     pictures = faces.subplots(1, max(1, len(frames)), squeeze=False)[0]
     for axes, (frame, label) in zip(pictures, frames, strict=False):
