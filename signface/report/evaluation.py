@@ -71,8 +71,8 @@ def results_table(classifiers: Mapping[str, Mapping]) -> pd.DataFrame:
 def draw_accuracy(protocols: Mapping[str, Mapping[str, Mapping]]) -> Figure:
     """Accuracy of each classifier on each section, one panel for each protocol (thesis, figure 4.4).
 
-    Whiskers are the bootstrap's intervals over takes; chance and the majority class are lines across the bars of
-    the reference segments.
+    Whiskers are the bootstrap's intervals over takes. Chance and the majority class, which differ between segments and
+    frames, are marks across each bar.
 
     Parameters
     ----------
@@ -95,11 +95,11 @@ def draw_accuracy(protocols: Mapping[str, Mapping[str, Mapping]]) -> Figure:
             panel.errorbar(
                 place, accuracy, yerr=[accuracy - low, high - accuracy], fmt="none", ecolor="#222", elinewidth=1
             )
-        reference = next(iter(classifiers.values()))["manual_segments"]
-        if reference["n"]:
-            panel.axhline(reference["chance"], color="#222", linewidth=1, linestyle=":", label="chance")
-            majority = f"majority class ({reference['majority_label']})"
-            panel.axhline(reference["majority"], color="#222", linewidth=1, linestyle="--", label=majority)
+            for column, style in (("chance", ":"), ("majority", "-")):
+                level = part[column].to_numpy(float)
+                left, right = [at - 0.125 for at in place], [at + 0.125 for at in place]
+                name = {"chance": "chance", "majority": "majority class"}[column] if number == 0 else None
+                panel.hlines(level, left, right, color="#d55e00", linewidth=1.6, linestyle=style, label=name)
         panel.set_xticks(range(len(names)), names)
         panel.set_ylim(0, 1)
         panel.set_title(PROTOCOL_TITLES[protocol])
@@ -134,7 +134,7 @@ def evaluation_page(
         "<h2>Labels</h2><figure>",
         _svg(draw_accuracy(protocols)),
         "<figcaption>Share of segments (or of time) with the reference's label. Whiskers: 95&nbsp;% of what other "
-        "draws of whole takes give. Dotted: a guess among the labels. Dashed: always the reference's most frequent "
+        "draws of whole takes give. Marks: a guess among the labels (dotted), and always the reference's most frequent "
         "label.</figcaption></figure>",
     ]
     for protocol, classifiers in protocols.items():
