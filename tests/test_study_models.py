@@ -131,7 +131,7 @@ def test_the_number_of_participants_that_find_a_difference_undoes_the_difference
 
 
 def test_power_is_that_of_a_simulated_study():
-    """Differences of 30 participants, normal: Wilcoxon's test finds the promised difference in about 80 % of studies."""
+    """Normal differences of 30 participants: Wilcoxon's test finds the promised one in about 80 % of studies."""
     from signface.study.rank_tests import wilcoxon
 
     rng, difference = np.random.default_rng(1), smallest_difference(1.0, 30)

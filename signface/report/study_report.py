@@ -247,8 +247,8 @@ def _figures(analysis: Analysis) -> dict[str, list[dict[str, str]]]:
             {
                 "name": "differences",
                 "svg": differences_figure(responses, contrasts, models, alpha=analysis.alpha),
-                "caption": "Differences between methods, with 95 % bootstrap intervals over participants. Filled: shown "
-                "by the mixed model with Holm's correction, for the question and for its pairs.",
+                "caption": "Differences between methods, with 95 % bootstrap intervals over participants. Filled: "
+                "shown by the mixed model with Holm's correction, for the question and for its pairs.",
             }
         )
     matrix = confusion_figure(responses)

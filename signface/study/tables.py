@@ -93,7 +93,8 @@ def write_cell(cell: object, kind: str) -> str:
 def as_text(table: StudyTable) -> str:
     """The table with aligned columns, for a terminal."""
     above, below = table.header()
-    rows = [*([above] if any(above) else []), below, *table.cells()]
+    first = [name if name != before else "" for before, name in zip(["", *above], above)]
+    rows = [*([first] if any(above) else []), below, *table.cells()]
     widths = [max(len(row[column]) for row in rows) for column in range(len(below))]
     left = [table.kind(column) == "text" for column in table.frame.columns]
     lines = [
