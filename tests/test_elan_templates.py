@@ -358,6 +358,7 @@ def test_five_thousand_annotations_go_in_within_two_seconds(tmp_path):
         ('LINGUISTIC_TYPE_REF="note"', 'LINGUISTIC_TYPE_REF="notes"', "type notes, which is not there"),
         ('PARENT_REF="Gloss"', 'PARENT_REF="Comment"', "depends on itself"),
         ('ANNOTATION_REF="a5"', 'ANNOTATION_REF="a9"', "a9 depends on itself"),
+        ("<ANNOTATION><REF_ANNOTATION", "<ANNOTATION/><ANNOTATION><REF_ANNOTATION", "on tier Comment is empty"),
         ("</TIME_ORDER>", "", "not well-formed"),
     ],
 )

@@ -122,6 +122,8 @@ def _annotations(root: etree._Element, media_ms: float | None) -> Iterator[str]:
             parents[annotation.get("ANNOTATION_ID")] = annotation.get("ANNOTATION_REF")
     for tier in root.iterfind("TIER"):
         name = tier.get("TIER_ID")
+        if any(len(annotation) == 0 for annotation in tier.iterfind("ANNOTATION")):
+            yield f"an annotation on tier {name} is empty: it has neither times nor a parent"
         spans = []
         for annotation in tier.iterfind("ANNOTATION/*"):
             identifier = annotation.get("ANNOTATION_ID")
