@@ -17,11 +17,14 @@ from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 
 #: A base is observed when its root mean square displacement at the markers reaches this share of the median base's.
-#: Below it, the marker noise would have to be read as a full activation.
-OBSERVED_SHARE = 0.02
+#: Below it, jitter and misfit would be read as activations: an eye turned sideways drags the lids by 0.2 mm.
+OBSERVED_SHARE = 0.2
 
 #: Relative size of a singular value of the marker matrix under which bases count as linearly dependent.
 DEPENDENT = 1e-7
+
+#: Cosine between two bases at the markers from which they count as opposed.
+OPPOSED = -1.0 + 1e-9
 
 
 @dataclass(frozen=True)
@@ -107,9 +110,16 @@ class MarkerBases:
         self._check_independent(layout)
 
     def _check_independent(self, layout: MarkerLayout) -> None:
-        """Raise when observed bases are linearly dependent at the markers, naming them."""
+        """Raise when observed bases are linearly dependent at the markers, naming them.
+
+        Of two bases that are exactly opposed (an eye turned in and out), weights of 0 or more tell which one acts:
+        that is no ambiguity, and only one of them is looked at.
+        """
         columns = self.matrix[:, self.observed]
         names = np.array(self.names)[self.observed]
+        length = np.linalg.norm(columns, axis=0)
+        opposed = (np.triu((columns / length).T @ (columns / length), k=1) < OPPOSED).any(axis=0)
+        columns, names = columns[:, ~opposed], names[~opposed]
         if 3 * self.n_markers < columns.shape[1]:
             raise SignfaceError(
                 f"{self.n_markers} face markers of the layout {layout.name} (3 coordinates each) cannot tell apart"

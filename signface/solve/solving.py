@@ -15,7 +15,7 @@ from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
-from signface.solve.adaptation import MorphologicalAdaptation
+from signface.solve.adaptation import MorphologicalAdaptation, SimilarityAdaptation, make_adaptation
 from signface.solve.methods import make_solver
 from signface.takes.filtering import CUTOFF_HZ, lowpass
 from signface.takes.gaps import LONG_S, SHORT_S, fill_gaps
@@ -42,7 +42,7 @@ class PreparedTake:
         The given layout without the markers that the neutral frame does not show; `displacements` follows it.
     head : (F, 4, 4) array
         Poses of the head.
-    adaptation : MorphologicalAdaptation
+    adaptation : SimilarityAdaptation or MorphologicalAdaptation
         From the signer's face, in its neutral pose, to the avatar's.
     take : Take
         The cleaned take.
@@ -53,7 +53,7 @@ class PreparedTake:
     displacements: np.ndarray
     layout: MarkerLayout
     head: np.ndarray
-    adaptation: MorphologicalAdaptation
+    adaptation: SimilarityAdaptation | MorphologicalAdaptation
     take: Take
     note: str
 
@@ -64,6 +64,7 @@ def prepare_take(
     layout: MarkerLayout,
     *,
     neutral: str | float = "auto",
+    adaptation: str = "similarity",
     short_gap_s: float = SHORT_S,
     long_gap_s: float = LONG_S,
     cutoff_hz: float = CUTOFF_HZ,
@@ -96,14 +97,14 @@ def prepare_take(
     aligned = align_neutral(clean, shown, target, time)
     still, poses = stabilise(aligned, head=head, neutral_s=time, fallback=head_fallback)
     _, places = neutral_markers(still, shown, time)
-    adaptation = MorphologicalAdaptation(places, target)
+    mapping = make_adaptation(adaptation, places, target)
     dropped = [label for label in layout.face_labels if label not in shown]
-    note = f"neutral frame {found} at {time:.3f} s; adapted to {face.name} by {len(shown)} markers of {layout.name}"
+    note = f"neutral frame {found} at {time:.3f} s; adapted to {face.name}"
+    note += f" ({mapping.description}) by {len(shown)} markers of {layout.name}"
     note += f" without {', '.join(dropped[:5])}{' ...' * (len(dropped) > 5)}" if dropped else ""
-    note += f", passing by them ({adaptation.smoothing:.1g})" if adaptation.smoothing else ""
     # Against the adapted neutral, not the avatar's: where the map passes by the markers, rest must still be rest.
-    displacements = adaptation.transform(still.select(shown)) - adaptation.transform(places)
-    return PreparedTake(displacements, part, poses, adaptation, still, note)
+    displacements = mapping.transform(still.select(shown)) - mapping.transform(places)
+    return PreparedTake(displacements, part, poses, mapping, still, note)
 
 
 def solve_take(
@@ -112,6 +113,7 @@ def solve_take(
     layout: MarkerLayout,
     *,
     neutral: str | float = "auto",
+    adaptation: str = "similarity",
     method: str = "thin-shell",
     alpha: float | None = None,
     short_gap_s: float = SHORT_S,
@@ -132,6 +134,8 @@ def solve_take(
         Where the markers stand on the avatar, and which of them carry the head.
     neutral : float or "auto"
         Time in seconds of a frame with a neutral face; `auto` looks for one.
+    adaptation : str
+        `similarity` or `rbf` (the thesis's), see `signface.solve.adaptation`.
     method, alpha
         See `signface.solve.methods.make_solver`.
     short_gap_s, long_gap_s : float
@@ -167,6 +171,7 @@ def solve_take(
         face,
         layout,
         neutral=neutral,
+        adaptation=adaptation,
         short_gap_s=short_gap_s,
         long_gap_s=long_gap_s,
         cutoff_hz=cutoff_hz,

@@ -2,47 +2,47 @@
 
 The energy of the weights `c` of one frame is
 
-    E(c) = D(c) + TOLERANCE^2 * alpha * T(c) + (1 - alpha) * B(c)
+    E(c) = D(c) + TOLERANCE^2 * alpha * T(c) + (1 - alpha) * H(c)
 
 - `D`: squared distances between the given and the solved markers, summed over the markers present, divided by what
   one typical base does to all markers (`MarkerBases.scale`): 1 is a typical base missed altogether.
 - `T`: the thin-shell energy of the deformed skin, half stretching and half bending, each divided by its mean over the
   bases that the markers observe: 1 is one typical base, fully active.
-- `B`: the bound energy (`signface.solve.bounds`), summed over the weights: exactly 0 where all lie between 0 and 1.
+- `H`: what holds the weights from 0 to 1 and at rest (`signface.solve.bounds`), summed over the weights.
 
-Why not eq. 5.25 as printed: its pointwise form depends on the unit of length and on how finely the face is meshed
-(on a dense face in centimetres it is of the order of 10^9 against 10 for the markers). Here every term is a ratio of
-like quantities, so that alpha means the same on any face: the weights do not change with the unit of length, and
-hardly with the subdivision of the mesh. Eq. 5.25 leaves out the rows of the vertices with markers; a vertex's share of
-an energy is proportional to the area around it, and 40 of 3,500 are a hundredth of it that vanishes as the mesh is
+Why not eq. 5.25 as printed: its pointwise form depends on the unit of length and on how finely the face is meshed (on
+a dense face in centimetres it is of the order of 10^9 against 10 for the markers). Here every term is a ratio of like
+quantities, so that alpha means the same on any face: the weights do not change with the unit of length, and hardly
+with the subdivision of the mesh. Eq. 5.25 leaves out the rows of the vertices with markers. A vertex's share of an
+energy is proportional to the area around it: 40 vertices of 3,400 hold a hundredth of it, which vanishes as the mesh is
 refined, so nothing is left out here. `docs/solver.md` has the figures.
 
-The energy is convex; where the markers and the shell leave a weight undetermined it is held at 0 by the shell.
+The energy is convex and has one minimum: weights that the markers leave undetermined are held by the shell.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.face.operators import thin_shell_matrices
-from signface.solve.bounds import bound_curvature, bound_energy, bound_slope
+from signface.solve.bounds import holding_curvature, holding_energy
+from signface.solve.newton import minimise
 from signface.solve.solver import MarkerBases, Solution, presence_patterns
 
 #: How much the shell counts beside the markers: a typical base's shell energy weighs as much as missing the markers
 #: by this share of what the base does to them.
-TOLERANCE = 0.1
+TOLERANCE = 0.05
 #: The weight of the thin shell that the thesis settles on (5.3, 6.3).
 ALPHA = 0.3
-#: The gradient's norm at which a frame counts as solved, relative to that at rest or to 1.
-GRADIENT = 1e-9
-#: Newton's steps are few; this many are never needed (the tests look).
-STEPS = 60
-#: Frames solved side by side.
-BATCH = 1024
+#: Weight of the rest energy.
+SPARSITY = 0.004
+#: The largest component of the gradient at which a frame counts as solved. Energies are of the order of 1.
+GRADIENT = 1e-8
+#: Frames solved at a time, so that a long take needs little memory.
+CHUNK = 16384
 
 
 class ThinShellSolver:
@@ -53,20 +53,44 @@ class ThinShellSolver:
     face : FaceModel
     layout : MarkerLayout
     alpha : float
-        Weight of the thin shell, from 0 (only the bounds regularise) to 1 (only the shell does); `1 - alpha` is the
-        weight of the bounds.
+        Weight of the thin shell, from 0 (only bounds and rest regularise) to 1 (only the shell does).
+    sparsity : float
+        Weight of the rest energy, 0 or more: what decides between explanations that the markers hardly tell apart.
+    threads : int, optional
+        Cores to use; all by default.
 
     Raises
     ------
     SignfaceError
-        `alpha` is not between 0 and 1, there are too few markers, or bases are linearly dependent at the markers.
+        `alpha` or `sparsity` is out of range, there are too few markers, or bases are linearly dependent there.
+
+    Examples
+    --------
+    >>> from signface.face.layout_files import read_layout
+    >>> from signface.face.reading import read_face
+    >>> face = read_face("default")
+    >>> layout = read_layout("default-40", face)
+    >>> smile = 0.8 * layout.bases(face)[[face.names.index("mouthSmileLeft")]]
+    >>> solution = ThinShellSolver(face, layout).solve(smile)
+    >>> solution.weights.shape, face.names[solution.weights[0].argmax()]
+    ((1, 51), 'mouthSmileLeft')
     """
 
-    def __init__(self, face: FaceModel, layout: MarkerLayout, *, alpha: float = ALPHA) -> None:
+    def __init__(
+        self,
+        face: FaceModel,
+        layout: MarkerLayout,
+        *,
+        alpha: float = ALPHA,
+        sparsity: float = SPARSITY,
+        threads: int | None = None,
+    ) -> None:
         if not (np.isfinite(alpha) and 0.0 <= alpha <= 1.0):
             raise SignfaceError(f"alpha must lie between 0 and 1, not {alpha}")
+        if not (np.isfinite(sparsity) and sparsity >= 0.0):
+            raise SignfaceError(f"sparsity must be 0 or more, not {sparsity}")
         self.names = face.names
-        self.alpha = float(alpha)
+        self.alpha, self.sparsity, self.threads = float(alpha), float(sparsity), threads
         self.markers = MarkerBases(face, layout)
         observed = self.markers.observed
         shell = np.zeros((int(observed.sum()),) * 2)
@@ -74,17 +98,25 @@ class ThinShellSolver:
             seen = part[np.ix_(observed, observed)]
             shell += 0.5 * seen / np.diag(seen).mean()
         self.shell = TOLERANCE**2 * self.alpha * shell
-        self.bounds = 1.0 - self.alpha
+        self.holding = 1.0 - self.alpha
         self._columns = self.markers.matrix[:, observed]
+        normal = self._columns.T @ self._columns / self.markers.scale + self.shell
+        # Rounding must not make bases that are opposed to one another (an eye turned in and out) undetermined.
+        normal[np.diag_indices_from(normal)] += 1e-12 * np.trace(normal)
+        self._normal = 0.5 * (normal + normal.T)
+        self._inverse = _inverse(self._normal)
+        self._pattern = np.ones(self.markers.n_markers, dtype=bool)
+        self._pattern_inverse = self._inverse
+        self._last: np.ndarray | None = None
 
     def energy(self, weights: np.ndarray, displacements: np.ndarray) -> np.ndarray:
         """(F,) energy of (F, N) weights for (F, P, 3) displacements: what `solve` minimises."""
         rows, present = self.markers.checked(displacements)
-        seen = np.repeat(present, 3, axis=1)
-        error = (weights @ self.markers.matrix.T - rows) * seen
+        error = (weights @ self.markers.matrix.T - rows) * np.repeat(present, 3, axis=1)
         own = weights[:, self.markers.observed]
         data = np.einsum("fi,fi->f", error, error) / self.markers.scale
-        return data + np.einsum("fi,ij,fj->f", own, self.shell, own) + self.bounds * bound_energy(own).sum(axis=1)
+        shell = np.einsum("fi,ij,fj->f", own, self.shell, own)
+        return data + shell + self.holding * holding_energy(own, self.sparsity).sum(axis=1)
 
     def solve(self, displacements: np.ndarray) -> Solution:
         """Weights of each frame at the optimum of the energy.
@@ -99,64 +131,111 @@ class ThinShellSolver:
         -------
         Solution
         """
+        parts = [
+            self._solve_chunk(displacements[start : start + CHUNK])
+            for start in range(0, max(1, len(displacements)), CHUNK)
+        ]
+        return Solution(
+            np.concatenate([part.weights for part in parts]), np.concatenate([part.residual for part in parts])
+        )
+
+    def _solve_chunk(self, displacements: np.ndarray) -> Solution:
         rows, present = self.markers.checked(displacements)
         weights = np.zeros((len(rows), len(self.names)))
+        right = rows @ (self._columns / self.markers.scale)  # a missing marker's row is 0
         for pattern, frames in presence_patterns(present):
-            columns = self._columns * np.repeat(pattern, 3)[:, None]
-            normal = columns.T @ columns / self.markers.scale + self.shell
-            for start in range(0, len(frames), BATCH):
-                batch = frames[start : start + BATCH]
-                right = rows[batch] @ columns / self.markers.scale
-                weights[np.ix_(batch, self.markers.observed)] = _minimise(normal, right, self.bounds)
+            inverse = self._inverse_for(pattern)
+            weights[np.ix_(frames, self.markers.observed)] = minimise(
+                right[frames] @ inverse,
+                inverse,
+                bounds=self.holding,
+                sparsity=self.sparsity,
+                tolerance=GRADIENT,
+                threads=self.threads,
+            )
         return self.markers.solution(weights, rows, present)
 
+    def push(self, frame: np.ndarray) -> Solution:
+        """Weights of one frame of a live capture, started from the frame pushed before it.
 
-def _minimise(normal: np.ndarray, right: np.ndarray, bounds: float) -> np.ndarray:
-    """(F, N) minimisers of `c' normal c - 2 right' c + bounds * sum B(c)`, by Newton's method on all frames at once.
+        Parameters
+        ----------
+        frame : (P, 3) array
+            Displacements of the face markers, as for `solve`.
 
-    A frame whose unbounded minimiser lies within the bounds is done at once. The steps of the others are shortened
-    until the energy falls (Armijo), which makes the method converge from anywhere on a convex energy.
-    """
-    slack = np.finfo(float).eps * len(normal) * np.trace(normal)
-    factor = cho_factor(normal + slack * np.eye(len(normal)))
-    weights = cho_solve(factor, right.T).T
-    if bounds == 0.0:
-        return weights
-    scale = GRADIENT * np.maximum(1.0, np.abs(right).max(axis=1))
-    active = np.arange(len(right))
-    # The exponential overflows far outside; what starts there starts from the nearest point just outside instead.
-    weights = np.clip(weights, -1.0, 2.0)
-    for _ in range(STEPS):
-        c, b = weights[active], right[active]
-        gradient = 2.0 * (c @ normal - b) + bounds * bound_slope(c)
-        left = np.abs(gradient).max(axis=1) > scale[active]
-        if not left.any():
-            break
-        active, c, b, gradient = active[left], c[left], b[left], gradient[left]
-        hessian = np.broadcast_to(2.0 * normal, (len(active), *normal.shape)).copy()
-        diagonal = np.arange(len(normal))
-        hessian[:, diagonal, diagonal] += bounds * bound_curvature(c) + 2.0 * slack
-        step = -np.linalg.solve(hessian, gradient[:, :, None])[:, :, 0]
-        weights[active] = _shortened(normal, b, bounds, c, step, gradient)
-    return weights
+        Returns
+        -------
+        Solution
+            Of one frame; the same weights as `solve` gives.
+        """
+        rows, present = self.markers.checked(np.asarray(frame, dtype=np.float64)[None])
+        weights = np.zeros((1, len(self.names)))
+        if present.any():
+            if (present[0] != self._pattern).any():
+                self._pattern, self._pattern_inverse = present[0], self._inverse_for(present[0])
+            right = rows @ self._columns / self.markers.scale
+            self._last = minimise(
+                right @ self._pattern_inverse,
+                self._pattern_inverse,
+                bounds=self.holding,
+                sparsity=self.sparsity,
+                tolerance=GRADIENT,
+                first=None if self._last is None else self._last[0],
+                threads=1,
+            )
+            weights[:, self.markers.observed] = self._last
+        return self.markers.solution(weights, rows, present)
+
+    def uncertainty(self, weights: np.ndarray, marker_error: float) -> np.ndarray:
+        """Standard deviation of each weight, from the curvature of the energy at the optimum.
+
+        With independent errors of the markers' coordinates and the energy read as a log-likelihood, the weights'
+        covariance is the inverse of the energy's second derivative (Laplace's approximation). It says how well the
+        markers and the regularisation determine a weight, not how well the face fits the signer.
+
+        Parameters
+        ----------
+        weights : (F, N) array
+            Solved weights.
+        marker_error : float
+            Standard deviation of a marker's coordinate in the face's unit (jitter and misfit, 0.3 mm say).
+
+        Returns
+        -------
+        (F, N) array
+            NaN for the bases that the markers do not observe.
+        """
+        observed = self.markers.observed
+        result = np.full(np.shape(weights), np.nan)
+        own = np.asarray(weights)[:, observed]
+        held = self.holding * holding_curvature(own, self.sparsity)
+        # D is the squared error over `scale`: a log-likelihood is it times scale / (2 * marker_error^2).
+        factor = marker_error / np.sqrt(self.markers.scale)
+        diagonal = np.arange(own.shape[1])
+        for start in range(0, len(own), 1024):
+            hessian = np.broadcast_to(self._normal, (len(own[start : start + 1024]), *self._normal.shape)).copy()
+            hessian[:, diagonal, diagonal] += 0.5 * held[start : start + 1024]
+            variance = np.linalg.inv(hessian)[:, diagonal, diagonal]
+            result[start : start + 1024, observed] = factor * np.sqrt(np.maximum(variance, 0.0))
+        return result
+
+    def _inverse_for(self, pattern: np.ndarray) -> np.ndarray:
+        """The inverse of the quadratic form when only some markers are there, by a low-rank update of the full one.
+
+        Taking k rows `a` out of `A = sum a' a + shell` gives `V + V a' (I - a V a')^-1 a V` with `V = A^-1`
+        (Woodbury); past a third as many rows as bases it is cheaper to invert anew.
+        """
+        if pattern.all():
+            return self._inverse
+        gone = self._columns[np.repeat(~pattern, 3)] / np.sqrt(self.markers.scale)
+        if 3 * len(gone) > len(self._inverse):
+            return _inverse(self._normal - gone.T @ gone)
+        across = self._inverse @ gone.T
+        inner = np.eye(len(gone)) - gone @ across
+        return self._inverse + across @ np.linalg.solve(inner, across.T)
 
 
-def _shortened(
-    normal: np.ndarray, right: np.ndarray, bounds: float, c: np.ndarray, step: np.ndarray, gradient: np.ndarray
-) -> np.ndarray:
-    """The points `c + t * step`, t halved in each frame until the energy falls enough."""
-    slope = np.einsum("fi,fi->f", gradient, step)
-    before = _energy(normal, right, bounds, c)
-    length = np.ones(len(c))
-    for _ in range(40):
-        after = _energy(normal, right, bounds, c + length[:, None] * step)
-        short = after > before + 1e-4 * length * slope + 1e-15 * np.abs(before)
-        if not short.any():
-            break
-        length[short] *= 0.5
-    return c + length[:, None] * step
-
-
-def _energy(normal: np.ndarray, right: np.ndarray, bounds: float, c: np.ndarray) -> np.ndarray:
-    """(F,) energies, but for the constant."""
-    return np.einsum("fi,fi->f", c @ normal - 2.0 * right, c) + bounds * bound_energy(c).sum(axis=1)
+def _inverse(matrix: np.ndarray) -> np.ndarray:
+    """The inverse of a symmetric positive definite matrix, symmetric to the last bit."""
+    inverse = np.linalg.inv(matrix)
+    return 0.5 * (inverse + inverse.T)
