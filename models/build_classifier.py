@@ -20,6 +20,7 @@ from signface.corpus.examples import solve_examples
 from signface.corpus.manifest import read_corpus
 from signface.evaluate.protocol import Fold, evaluate
 from signface.files import whole_file
+from signface.label.labellers import NAMES
 from signface.label.model import Card
 from signface.label.persistence import save_model
 from signface.label.training import Example, train_model
@@ -92,7 +93,7 @@ def card_text(card: Card, sections: dict) -> str:
     )
     return f"""# The default classifier
 
-A {card.classifier} (scikit-learn, {card.frames} training frames, seed {card.seed}), written by
+A {NAMES[card.classifier]} (scikit-learn, {card.frames} training frames, seed {card.seed}), written by
 `models/build_classifier.py` with signface {card.version}.
 
 **It has met no real signer.** It was trained on a synthetic corpus made by `signface synth`, in which no person is

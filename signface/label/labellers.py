@@ -31,7 +31,7 @@ def make_labeller(name: str, *, seed: int = 0) -> BaseEstimator:
     - `svm-linear`, `svm-rbf`: C = 1 on weights scaled to unit variance. Their probabilities are Platt's, fitted on
       three folds of consecutive training frames (neighbouring frames are nearly equal, so that shuffled folds would
       tell the machine about its own test frames).
-    - `forest`: 200 trees of at most 12 levels, with at least 3 frames in a leaf, which keeps a saved model small.
+    - `forest`: 150 trees of at most 12 levels, with at least 3 frames in a leaf, which keeps a saved model small.
 
     Parameters
     ----------
@@ -63,5 +63,5 @@ def make_labeller(name: str, *, seed: int = 0) -> BaseEstimator:
     if name == "forest":
         from sklearn.ensemble import RandomForestClassifier
 
-        return RandomForestClassifier(n_estimators=200, max_depth=12, min_samples_leaf=3, random_state=seed)
+        return RandomForestClassifier(n_estimators=150, max_depth=12, min_samples_leaf=3, random_state=seed)
     raise SignfaceError(f"there is no classifier named {name}", hint=f"choose one of {', '.join(NAMES)}")
