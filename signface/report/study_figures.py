@@ -153,7 +153,10 @@ def confusion_figure(responses: Responses) -> str:
             axes = figure.add_subplot(lines, columns, place)
             totals = counts.sum(axis=1).to_numpy()[:, None]
             shares = np.divide(counts.to_numpy(float), totals, out=np.zeros(counts.shape), where=totals > 0)
-            axes.imshow(shares, cmap="Blues", vmin=0, vmax=1)
+            edges = [np.arange(size + 1) - 0.5 for size in shares.shape[::-1]]
+            axes.pcolormesh(*edges, shares, cmap="Blues", vmin=0, vmax=1, edgecolors="white", linewidth=1)
+            axes.set_aspect("equal")
+            axes.invert_yaxis()
             for row, column in np.ndindex(shares.shape):
                 share = shares[row, column]
                 axes.text(

@@ -241,7 +241,8 @@ def models_table(responses: Responses, comparisons: dict[str, MethodComparison])
             "Mixed model: cumulative logit (logistic for accuracy) with random intercepts for participants, for "
             "participants × methods (reactions) and for what was played (stimuli); likelihood-ratio test of the "
             "methods, referred to F with (participants − 1)(methods − 1) degrees of freedom. Population-averaged: "
-            "generalised estimating equations, participants as clusters. Over participants: Friedman (Wilcoxon for two methods) on one mean per participant and method.",
+            "generalised estimating equations, participants as clusters. Over participants: Friedman (Wilcoxon for two "
+            "methods) on one mean per participant and method.",
             *notes,
         ),
     )
