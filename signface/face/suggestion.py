@@ -1,8 +1,8 @@
 """Where do the markers of an unknown take stand? `suggest_layout` lays its neutral frame on a face.
 
-The neutral markers are registered to the skin: first by rotation, translation and scale, iterating nearest points
-(P. Besl and N. McKay, 1992) from every axis convention a recording may have; then by an affine map and a smooth warp,
-because the signer's head has another shape. The result is a proposal to be looked at, not a measurement.
+The neutral markers are registered to the skin: first by rotation, translation and scale, from every direction a
+recording may have; then by an affine map and a smooth warp, because the signer's head has another shape. The result is
+a proposal to be looked at, not a measurement.
 """
 
 from __future__ import annotations
@@ -22,13 +22,11 @@ from signface.face.model import FaceModel
 from signface.face.subdivision import subdivide
 
 #: A head is at most so much smaller or larger than the model's.
-SCALES = (0.8, 1.25)
+SCALES = (0.85, 1.15)
 #: Skin that no base moves by this much (mm) carries head markers.
 RIGID_MM = 0.5
 #: A marker this far from the skin after registration stands on a cap or a stick (mm).
 OFF_SKIN_MM = 15.0
-#: Share of the markers, the nearest ones, that a step of the registration listens to.
-HEEDED = 0.85
 
 
 @dataclass(frozen=True)
@@ -82,8 +80,19 @@ def suggest_layout(labels: Sequence[str], points: np.ndarray, face: FaceModel) -
 
     fine = subdivide(face).mesh.vertices
     skin = cKDTree(fine)
-    lively = face.mesh.vertices[np.linalg.norm(face.bases, axis=2).max(axis=0) > 2.0]
-    placed, scale = _best_similarity(points, fine, skin, lively)
+    # Where markers are worn: skin that moves and looks forward, not the underside of the chin.
+    moving = np.linalg.norm(face.bases, axis=2).max(axis=0) > 1.5
+    normals = face.mesh.vertex_normals
+    forward = normals[moving].mean(axis=0)
+    lively = face.mesh.vertices[moving & (normals @ (forward / np.linalg.norm(forward)) > 0.35)]
+    placed, scale = _best_motion(points, lively), 1.0
+    for _ in range(5):
+        apart, nearest = skin.query(placed)
+        use = np.argsort(apart)[: max(8, round(0.85 * len(points)))]
+        rotation, shift, step = _similarity(placed[use], fine[nearest[use]], np.ones(len(use)))
+        step = float(np.clip(scale * step, *SCALES)) / scale
+        placed = step * (placed - placed[use].mean(axis=0)) @ rotation.T + fine[nearest[use]].mean(axis=0)
+        scale *= step
     distance = skin.query(placed)[0]
     warped = _warp(placed, fine, skin)
     corners, barycentric, apart = nearest_points(face.mesh, warped)
@@ -95,44 +104,79 @@ def suggest_layout(labels: Sequence[str], points: np.ndarray, face: FaceModel) -
     return Suggestion(MarkerLayout(tuple(names), roles, corners, barycentric, "suggested"), distance, scale)
 
 
-def _similarity(source: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def _similarity(source: np.ndarray, target: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Rotation (3, 3), shift (3,) and scale that bring source points onto target points best (S. Umeyama, 1991)."""
-    a, b = source - source.mean(axis=0), target - target.mean(axis=0)
-    u, singular, vt = np.linalg.svd(b.T @ a)
+    own = weight / weight.sum()
+    middle, goal = own @ source, own @ target
+    a, b = source - middle, target - goal
+    u, singular, vt = np.linalg.svd((b * own[:, None]).T @ a)
     sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
     rotation = (u * sign) @ vt
-    scale = float(np.clip((singular * sign).sum() / max((a**2).sum(), 1e-12), *SCALES))
-    return rotation, target.mean(axis=0) - scale * rotation @ source.mean(axis=0), scale
+    scale = float(np.clip((singular * sign).sum() / max((own[:, None] * a**2).sum(), 1e-12), *SCALES))
+    return rotation, goal - scale * rotation @ middle, scale
 
 
-def _best_similarity(
-    points: np.ndarray, fine: np.ndarray, skin: cKDTree, lively: np.ndarray
-) -> tuple[np.ndarray, float]:
-    """The markers on the face and the scale, over all starts.
+def _best_motion(points: np.ndarray, lively: np.ndarray) -> np.ndarray:
+    """(M, 3) the markers moved rigidly onto the face, the likeliest over all starts.
 
-    A start is judged by the markers' distance from the skin, and by how well they cover the skin that moves: on a skull
-    alone, many places fit a handful of points.
+    Rigid coherent point drift (A. Myronenko and X. Song, 2010): the markers are the centres of a mixture of Gaussians
+    that explains points spread over the skin that moves. Unlike nearest points alone, it asks that the markers cover
+    that skin, so they do not slide about on a smooth skull.
     """
-    best: tuple[float, np.ndarray, float] | None = None
-    heeded = max(6, round(HEEDED * len(points)))
-    for start in Rotation.create_group("O"):
-        now = start.apply(points - points.mean(axis=0)) + lively.mean(axis=0)
-        scale = 1.0
-        for _ in range(40):
-            apart, nearest = skin.query(now)
-            use = np.argsort(apart)[:heeded]
-            rotation, shift, scale = _similarity(points[use], fine[nearest[use]])
-            moved = scale * points @ rotation.T + shift
-            if np.abs(moved - now).max() < 0.01:
+    some = _spread(points, 60)
+    skin = lively[_spread_rows(lively, 200)]
+    best: tuple[float, np.ndarray] | None = None
+    middle = np.median(some, axis=0)
+    for start in _starts(some - middle):
+        rotation, shift = start, skin.mean(axis=0) - start @ middle
+        variance = 40.0**2
+        for _ in range(60):
+            now = some @ rotation.T + shift
+            squared = ((skin[:, None] - now[None]) ** 2).sum(axis=2)
+            kernel = np.exp(-squared / (2 * variance))
+            outlier = (2 * np.pi * variance) ** 1.5 * 0.1 / 0.9 * len(some) / 4e6  # spread over a head's volume, mm3
+            total = kernel.sum(axis=1, keepdims=True) + outlier
+            share = kernel / total
+            weight = share.sum(axis=0)
+            goal = (share.T @ skin) / np.maximum(weight, 1e-12)[:, None]
+            rotation, shift, _ = _similarity(some, goal, weight)  # the markers' spread is no measure of size
+            shift = weight @ (goal - some @ rotation.T) / weight.sum()
+            before = variance
+            moved = some @ rotation.T + shift
+            spread = (share * ((skin[:, None] - moved[None]) ** 2).sum(axis=2)).sum()
+            variance = max(float(spread / (3 * weight.sum())), 4.0)
+            if abs(variance - before) < 1e-4 * before:
                 break
-            now = moved
-        apart = np.sort(skin.query(now)[0])[:heeded]
-        cover = cKDTree(now).query(lively)[0]
-        cost = float(np.sqrt((apart**2).mean()) + 0.5 * np.sqrt((cover**2).mean()))
+        cost = float(-np.log(total / (2 * np.pi * variance) ** 1.5).mean())
         if best is None or cost < best[0]:
-            best = cost, now, scale
+            best = cost, points @ rotation.T + shift
     assert best is not None
-    return best[1], best[2]
+    return best[1]
+
+
+def _starts(centred: np.ndarray) -> list[np.ndarray]:
+    """Rotations to start from: every axis convention, and the plane of the markers facing forward at every turn."""
+    starts = list(Rotation.create_group("O").as_matrix())
+    axes = np.linalg.svd(centred, full_matrices=False)[2]
+    axes[2] *= np.sign(np.linalg.det(axes))
+    for flip in (np.eye(3), np.diag([-1.0, 1.0, -1.0])):
+        for turn in np.arange(0.0, 360.0, 30.0):
+            starts.append(Rotation.from_euler("z", turn, degrees=True).as_matrix() @ flip @ axes)
+    return starts
+
+
+def _spread_rows(points: np.ndarray, count: int) -> np.ndarray:
+    """Rows of at most `count` points spread evenly: each next one is the farthest from those before."""
+    rows = [int(np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
+    distance = np.linalg.norm(points - points[rows[0]], axis=1)
+    while len(rows) < min(count, len(points)):
+        rows.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(points - points[rows[-1]], axis=1))
+    return np.array(rows)
+
+
+def _spread(points: np.ndarray, count: int) -> np.ndarray:
+    return points[_spread_rows(points, count)]
 
 
 def _warp(placed: np.ndarray, fine: np.ndarray, skin: cKDTree) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.files import whole_file
-from signface.render.still import face_camera, render, whole_mesh
+from signface.render.still import Camera, render, whole_mesh
 
 #: Title of each view and its yaw in degrees.
 VIEWS = (("signer's right", -75.0), ("front", 0.0), ("signer's left", 75.0))
@@ -37,9 +37,11 @@ def draw_layout(face: FaceModel, layout: MarkerLayout, path: str | PathLike[str]
     mesh, colours = whole_mesh(face)
     figure = Figure(figsize=(21.6, 9.6), dpi=100)
     FigureCanvasAgg(figure)
+    low, high = points.min(axis=0), points.max(axis=0)
+    centre, extent = (low + high) / 2, 1.2 * float(max(high[1] - low[1], np.max(high - low) * size[1] / size[0]))
     small = 7 if len(placed) > 120 else 9
     for column, (title, yaw) in enumerate(VIEWS):
-        camera = face_camera(face, yaw=yaw, size=size, margin=1.75)
+        camera = Camera(centre, extent, yaw, 0.0, size)
         axes = figure.add_axes((column / 3, 0.03, 1 / 3, 0.92))
         axes.imshow(render(mesh, camera, colours), interpolation="none")
         axes.set_title(title, fontsize=12)
