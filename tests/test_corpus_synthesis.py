@@ -180,6 +180,12 @@ def test_the_command_writes_a_corpus_and_says_so(tmp_path, capsys):
     assert len(read_corpus(folder)) == 4
 
 
+def test_the_corpus_that_ships_has_its_own_seed_and_signers(tmp_path, capsys):
+    assert main(["synth", str(tmp_path / "x"), "--mini", "--seed", "3"]) == 2
+    assert "--mini has its own seed" in capsys.readouterr().err
+    assert not (tmp_path / "x").exists()
+
+
 def test_a_folder_with_other_things_is_left_alone(tmp_path, capsys):
     (tmp_path / "thesis.tex").write_text("years of work")
     assert main(["synth", str(tmp_path), "--mini"]) == 2

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from signface.errors import SignfaceError
+
 EXAMPLE = """  signface synth corpora/feel
   signface synth corpora/utterances --signers 3 --seed 7 --kinds EU"""
 
@@ -11,13 +13,10 @@ EXAMPLE = """  signface synth corpora/feel
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("folder", metavar="FOLDER", help="where to write; new or empty, or made by the same command")
-    parser.add_argument("--signers", type=int, default=2, metavar="N", help="how many signers (default 2)")
-    parser.add_argument(
-        "--seed", type=int, default=0, metavar="S", help="the same seed gives the same corpus (default 0)"
-    )
+    parser.add_argument("--signers", type=int, metavar="N", help="how many signers (default 2)")
+    parser.add_argument("--seed", type=int, metavar="S", help="the same seed gives the same corpus (default 0)")
     parser.add_argument(
         "--kinds",
-        default="IE,SE,EU",
         metavar="KINDS",
         help="isolated expressions (IE), sequences (SE), utterances (EU), joined by commas (default all)",
     )
@@ -29,13 +28,13 @@ def run(arguments: argparse.Namespace) -> int:
     from signface.cli.progress import progress
     from signface.corpus.synthesis import synthesise
 
+    settings = {key: getattr(arguments, key) for key in ("signers", "seed") if getattr(arguments, key) is not None}
+    if arguments.kinds is not None:
+        settings["kinds"] = [kind.strip() for kind in arguments.kinds.split(",") if kind.strip()]
+    if arguments.mini and settings:
+        raise SignfaceError(f"--mini has its own {' and '.join(settings)}", hint="leave them out")
     corpus = synthesise(
-        arguments.folder,
-        signers=arguments.signers,
-        seed=arguments.seed,
-        kinds=[kind.strip() for kind in arguments.kinds.split(",") if kind.strip()],
-        mini=arguments.mini,
-        show=lambda jobs: progress(jobs, "making takes"),
+        arguments.folder, mini=arguments.mini, show=lambda jobs: progress(jobs, "making takes"), **settings
     )
     print(f"{corpus.folder}: {len(corpus)} takes of {len(corpus.signers)} signers, described in takes.csv")
     return 0
