@@ -117,7 +117,6 @@ def test_recordings_come_back_from_c3d_in_millimetres(mini):
 
 def test_forty_markers_on_the_face_and_six_on_the_head():
     from signface.face.layout_files import read_layout
-
     from signface.face.reading import read_face
 
     layout = read_layout("default-40", read_face("default"))
