@@ -77,7 +77,7 @@ def test_obj_shapes_of_another_topology_are_refused(tmp_path):
     face = mask()
     write_obj(tmp_path / "neutral.obj", face.mesh.vertices, face.mesh.triangles)
     write_obj(tmp_path / "jawOpen.obj", face.mesh.vertices[:-1], face.mesh.triangles[:4])
-    with pytest.raises(SignfaceError, match="62 vertices but the neutral neutral.obj has 63"):
+    with pytest.raises(SignfaceError, match=r"62 vertices but the neutral neutral\.obj has 63"):
         read_face(tmp_path)
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy.spatial import cKDTree
 
 from signface.errors import SignfaceError
 from signface.face.layout import ROLES, MarkerLayout
@@ -157,18 +158,23 @@ def nearest_points(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarr
     distance : (K,) array
         Distances from the points to the mesh.
     """
-    points = np.asarray(points, dtype=np.float64)
-    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
-    corners, barycentric, distance = [], [], []
-    for point in points:
-        weights = _closest_barycentric(point, a, b, c)
-        found = weights[:, :1] * a + weights[:, 1:2] * b + weights[:, 2:] * c
-        apart = np.linalg.norm(found - point, axis=1)
-        best = int(np.argmin(apart))
-        corners.append(mesh.triangles[best])
-        barycentric.append(weights[best])
-        distance.append(apart[best])
-    return np.array(corners).reshape(-1, 3), np.array(barycentric).reshape(-1, 3), np.array(distance)
+    points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+    centroids = mesh.vertices[mesh.triangles].mean(axis=1)
+    reach = np.linalg.norm(mesh.vertices[mesh.triangles] - centroids[:, None], axis=2).max()
+    tree = cKDTree(centroids)
+    # The nearest centroid is a point of the mesh, so no triangle farther off than that can hold a nearer one.
+    bound = tree.query(points)[0]
+    candidates = tree.query_ball_point(points, bound + reach + 1e-9)
+    owner = np.repeat(np.arange(len(points)), [len(own) for own in candidates])
+    triangle = np.concatenate([np.sort(own) for own in candidates]) if len(points) else np.zeros(0)
+    triangle = triangle.astype(np.int64)
+    a, b, c = (mesh.vertices[mesh.triangles[triangle, k]] for k in range(3))
+    weights = _closest_barycentric(points[owner], a, b, c)
+    found = weights[:, :1] * a + weights[:, 1:2] * b + weights[:, 2:] * c
+    apart = np.linalg.norm(found - points[owner], axis=1)
+    order = np.lexsort((triangle, apart, owner))
+    best = order[np.searchsorted(owner[order], np.arange(len(points)))]
+    return mesh.triangles[triangle[best]], weights[best], apart[best]
 
 
 def _closest_barycentric(point: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:

@@ -85,14 +85,8 @@ def suggest_layout(labels: Sequence[str], points: np.ndarray, face: FaceModel) -
     normals = face.mesh.vertex_normals
     forward = normals[moving].mean(axis=0)
     lively = face.mesh.vertices[moving & (normals @ (forward / np.linalg.norm(forward)) > 0.35)]
-    placed, scale = _best_motion(points, lively), 1.0
-    for _ in range(5):
-        apart, nearest = skin.query(placed)
-        use = np.argsort(apart)[: max(8, round(0.85 * len(points)))]
-        rotation, shift, step = _similarity(placed[use], fine[nearest[use]], np.ones(len(use)))
-        step = float(np.clip(scale * step, *SCALES)) / scale
-        placed = step * (placed - placed[use].mean(axis=0)) @ rotation.T + fine[nearest[use]].mean(axis=0)
-        scale *= step
+    tries = [_settled(start, fine, skin) for start in _likely_motions(points, lively)]
+    placed, scale, _ = min(tries, key=lambda settled: settled[2])
     distance = skin.query(placed)[0]
     warped = _warp(placed, fine, skin)
     corners, barycentric, apart = nearest_points(face.mesh, warped)
@@ -116,8 +110,22 @@ def _similarity(source: np.ndarray, target: np.ndarray, weight: np.ndarray) -> t
     return rotation, goal - scale * rotation @ middle, scale
 
 
-def _best_motion(points: np.ndarray, lively: np.ndarray) -> np.ndarray:
-    """(M, 3) the markers moved rigidly onto the face, the likeliest over all starts.
+def _settled(placed: np.ndarray, fine: np.ndarray, skin: cKDTree) -> tuple[np.ndarray, float, float]:
+    """Markers settled on their nearest points with their own scale, the scale, and their distance left (mm, RMS)."""
+    scale = 1.0
+    heeded = max(8, round(0.85 * len(placed)))
+    for _ in range(5):
+        apart, nearest = skin.query(placed)
+        use = np.argsort(apart)[:heeded]
+        rotation, _, step = _similarity(placed[use], fine[nearest[use]], np.ones(len(use)))
+        step = float(np.clip(scale * step, *SCALES)) / scale
+        placed = step * (placed - placed[use].mean(axis=0)) @ rotation.T + fine[nearest[use]].mean(axis=0)
+        scale *= step
+    return placed, scale, float(np.sqrt((np.sort(skin.query(placed)[0])[:heeded] ** 2).mean()))
+
+
+def _likely_motions(points: np.ndarray, lively: np.ndarray, most: int = 6) -> list[np.ndarray]:
+    """The markers (M, 3) moved rigidly onto the face: the likeliest different ways, from all starts.
 
     Rigid coherent point drift (A. Myronenko and X. Song, 2010): the markers are the centres of a mixture of Gaussians
     that explains points spread over the skin that moves. Unlike nearest points alone, it asks that the markers cover
@@ -125,7 +133,7 @@ def _best_motion(points: np.ndarray, lively: np.ndarray) -> np.ndarray:
     """
     some = _spread(points, 60)
     skin = lively[_spread_rows(lively, 200)]
-    best: tuple[float, np.ndarray] | None = None
+    found: list[tuple[float, np.ndarray]] = []
     middle = np.median(some, axis=0)
     for start in _starts(some - middle):
         rotation, shift = start, skin.mean(axis=0) - start @ middle
@@ -148,10 +156,12 @@ def _best_motion(points: np.ndarray, lively: np.ndarray) -> np.ndarray:
             if abs(variance - before) < 1e-4 * before:
                 break
         cost = float(-np.log(total / (2 * np.pi * variance) ** 1.5).mean())
-        if best is None or cost < best[0]:
-            best = cost, points @ rotation.T + shift
-    assert best is not None
-    return best[1]
+        found.append((cost, points @ rotation.T + shift))
+    different: list[np.ndarray] = []
+    for _, moved in sorted(found, key=lambda way: way[0]):
+        if all(np.abs(moved - other).max() > 15.0 for other in different):
+            different.append(moved)
+    return different[:most]
 
 
 def _starts(centred: np.ndarray) -> list[np.ndarray]:
