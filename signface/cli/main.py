@@ -26,6 +26,7 @@ COMMANDS = {
     "layout": "show, check and suggest marker layouts",
     "synth": "make a synthetic corpus",
     "elan": "check, map, compare and learn from EAF files; a button inside ELAN",
+    "study": "run a perceptual study: films, questionnaire, statistics",
     "demo": "annotate the takes that ship with signface",
 }
 
