@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
 
+import signface
 from signface.errors import SignfaceError
 from signface.study.model_tables import compare_methods
 from signface.study.rank_tests import kruskal_wallis
@@ -34,6 +38,31 @@ def test_each_participant_sees_each_film_once_in_an_order_of_their_own():
     assert (table.groupby(["participant", "stimulus"]).size() == 1).all()
     orders = table.groupby("participant")["stimulus"].agg(tuple)
     assert orders.nunique() == 5
+
+
+def test_a_studys_folder_is_simulated_as_it_would_be_shown():
+    from signface.study.design import read_study
+    from signface.study.simulation import study_design
+
+    folder = Path(signface.__file__).parent / "study" / "examples" / "group-2a"
+    study, design = read_study(folder, films=False), study_design(str(folder))
+    shown = [stimulus.name for block in study.blocks for stimulus in block.stimuli]
+    table = simulate(design, participants=3, seed=1)
+    assert sorted(table["stimulus"].unique()) == sorted(shown)
+    assert len(validate(table).table) == 3 * len(shown)
+
+
+def test_a_stimulus_is_asked_the_questions_of_its_block_alone():
+    whole = crossed_design("x", ["A", "video"], ["correct", "answer_intensity"], 5)
+    videos = whole.stimuli.loc[whole.stimuli["method"] == "video", "stimulus"]
+    design = replace(whole, asked=dict.fromkeys(videos, frozenset(["correct"])))
+    table = simulate(design, seed=1)
+    of_video = table["method"] == "video"
+    assert table.loc[of_video, "answer_intensity"].isna().all()
+    assert table.loc[~of_video, "answer_intensity"].notna().all()
+    assert table["answer_expression"].notna().all()
+    responses = validate(table)
+    assert compare_methods(responses, "answer_intensity").methods == ["A"]
 
 
 def test_errors_fall_where_the_thesis_saw_them():

@@ -15,6 +15,7 @@ from typing import Any
 
 from signface.errors import SignfaceError
 from signface.files import whole_file
+from signface.label.vocabulary import AFFECTS
 from signface.report.study_figures import confusion_figure, differences_figure, expressions_figure, means_figure
 from signface.study.analysis import Analysis, Section
 from signface.study.tables import StudyTable, as_latex
@@ -50,10 +51,11 @@ READING = (
     "Conditions: Spearman wants a monotone relation, χ² an expected count of 5 in each cell, Kruskal-Wallis 5 answers "
     "in each group, Scheirer-Ray-Hare 5 in each cell, Wilcoxon 20 pairs that differ. Where one is not met, the table "
     "says so.",
-    "All these tests but those on pairs take answers as independent of each other. They are not: a participant gives "
-    "many. For methods, which every participant sees, this mostly hides differences; for age, gender, vision or habit, "
-    "which belong to the participant, it finds differences that are not there. The part with participants as random "
-    "effects, the column “p over participants” and the intervals over participants do not make that assumption.",
+    "All these tests take answers, or pairs of answers, as independent of each other. They are not: a participant "
+    "gives many. For age, gender, vision or habit, which belong to the participant, they find differences that are not "
+    "there; for methods, they do so when participants react to a method each in their own way, and hide differences when they "
+    "do not. The part with participants as random effects, the column “p over participants” and the intervals over "
+    "participants do not make that assumption; where the two disagree, trust them.",
     "Where several hypotheses are tested at once, p (Holm) keeps the chance of any false alarm among them below the "
     "level.",
 )
@@ -169,7 +171,7 @@ def _facts(analysis: Analysis) -> list[tuple[str, str, str]]:
         ("participants", f"{len(responses.participants)}", "simulated" if responses.simulated else ""),
         ("answers", f"{len(table)}", f"{len(table) / len(people):.3g} each"),
         ("methods", f"{len(responses.methods)}", ", ".join(responses.methods)),
-        ("expressions", f"{len(responses.expressions)}", ", ".join(responses.expressions)),
+        ("expressions", f"{len(responses.expressions)}", ", ".join(map(_spelt, responses.expressions))),
     ]
     if people["age"].notna().any():
         age = people["age"].dropna()
@@ -178,6 +180,11 @@ def _facts(analysis: Analysis) -> list[tuple[str, str, str]]:
         counts = people["gender"].value_counts().sort_index()
         facts.append(("gender", " · ".join(f"{count} {name}" for name, count in counts.items()), ""))
     return facts
+
+
+def _spelt(label: str) -> str:
+    """An expression's label with what it stands for, where it is one of signface's own."""
+    return f"{label} {AFFECTS[label]}" if label in AFFECTS else label
 
 
 def _section(section: Section, figures: list[dict[str, str]], analysis: Analysis) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from itertools import combinations
 from signface.study.corrections import holm
 from signface.study.model_tables import MethodComparison
 from signface.study.responses import Responses
-from signface.study.tables import StudyTable, write_cell
+from signface.study.tables import StudyTable, write_p
 
 
 def findings(
@@ -47,7 +47,7 @@ def findings(
         if math.isnan(thesis["p"]):
             said.append(f"{name.capitalize()}: nothing can be tested ({thesis['conditions not met']}).")
             continue
-        test = f"{thesis['test']}: {_p(thesis['p (Holm)'])}, {thesis['effect']}, {thesis['size']}"
+        test = f"{thesis['test']}: {write_p(thesis['p (Holm)'])}, {thesis['effect']}, {thesis['size']}"
         if math.isnan(model_p):
             shown = thesis["p (Holm)"] < alpha
             verb = "the methods differ" if shown else "no difference between the methods is shown"
@@ -60,7 +60,7 @@ def findings(
             for pair, (_, contrast) in zip(pairs, own.iterrows())
             if contrast["mixed model", "p (Holm)"] < alpha
         ]
-        model = f"mixed model: {_p(model_p)}"
+        model = f"mixed model: {write_p(model_p)}"
         if model_p < alpha and differing:
             sentence = f"{name.capitalize()}: {'; '.join(differing)} ({test}; {model})."
         elif model_p < alpha:
@@ -81,8 +81,3 @@ def _difference(pair: tuple[str, str], contrast) -> str:  # type: ignore[no-unty
         pair, value, low, high = pair[::-1], -value, -high, -low
     interval = f"{low:.2f} to {high:.2f}".replace("-", "−")
     return f"{pair[0]} is higher than {pair[1]} by {value:.2f} (95 % interval {interval})"
-
-
-def _p(value: float) -> str:
-    written = write_cell(float(value), "p")
-    return f"p {written}" if written.startswith("<") else f"p = {written}"

@@ -16,7 +16,7 @@ from signface.study.contingency import chi_square
 from signface.study.corrections import holm
 from signface.study.rank_tests import kruskal_wallis, spearman
 from signface.study.responses import FACTORS, PERSONAL, Responses
-from signface.study.tables import StudyTable, write_cell
+from signface.study.tables import StudyTable, write_cell, write_p
 from signface.study.test_result import TestResult
 from signface.study.thesis_tables import RESULT_KINDS, _result_cells, right_and_wrong
 
@@ -150,8 +150,7 @@ def remarks_table(responses: Responses, results: list[Influence], *, alpha: floa
 def _sentence(responses: Responses, found: Influence) -> str:
     name, factor = responses.questions[found.question], FACTORS[found.factor]
     table = responses.table.dropna(subset=[found.question, found.factor])
-    p = write_cell(found.result.p, "p")
-    p = f"p {p}" if p.startswith("<") else f"p = {p}"
+    p = write_p(found.result.p)
     if found.result.symbol == "ρ":
         way = "rises" if found.result.effect > 0 else "falls"
         return f"{name.capitalize()} {way} with {factor} (ρ = {write_cell(found.result.effect, 'effect')}, {p})"
@@ -169,15 +168,13 @@ def _doubts(responses: Responses, found: Influence, corrected: float, alpha: flo
     if result.symbol == "ρ" and abs(result.effect) < 0.1:
         doubts.append("ρ is small: if there is an influence, it is weak")
     if corrected >= alpha:
-        doubts.append(f"not significant with Holm's correction (p = {write_cell(corrected, 'p')})")
+        doubts.append(f"not significant with Holm's correction ({write_p(corrected)})")
     if (
         found.over_participants is not None
         and found.over_participants is not result
         and not found.over_participants.p < alpha
     ):
-        doubts.append(
-            f"not significant with one value per participant (p = {write_cell(found.over_participants.p, 'p')})"
-        )
+        doubts.append(f"not significant with one value per participant ({write_p(found.over_participants.p)})")
     if found.factor in PERSONAL:
         shares = responses.people()[found.factor].value_counts()
         if found.factor in ORDERED and shares.iloc[0] > shares.sum() / 2:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,6 +31,9 @@ EXPRESSIONS = ("A", "D", "F", "J", "Sa", "Su")
 
 #: Where latent values are cut into the answers 1 to 7.
 THRESHOLDS = (-2.2, -1.6, -1.0, -0.4, 0.3, 1.1)
+
+#: question: its column in the csv, where that has another name.
+_CSV = {"correct": "answer_expression"}
 
 #: What one step of played intensity adds to the latent answer.
 _PLAYED = {"answer_intensity": 0.75, "answer_difficulty": 0.15, "answer_credibility": 0.15, "answer_fidelity": 0.1}
@@ -55,12 +59,18 @@ class Design:
         Columns of answers: `correct` stands for the forced choice of an expression.
     participants : int
         How many take part when nobody says otherwise.
+    asked : mapping of str to frozenset of str
+        Stimulus to its questions, where blocks ask different ones; a stimulus that is not named is asked all.
+    labels : tuple of str
+        What can be answered to the forced choice; the played expressions when empty.
     """
 
     name: str
     stimuli: pd.DataFrame
     questions: tuple[str, ...]
     participants: int = 20
+    asked: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    labels: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -138,7 +148,41 @@ def study_design(name: str) -> Design:
     SignfaceError
         There is neither a folder nor a design of that name.
     """
-    return thesis_design(name)
+    if not Path(name).exists():
+        return thesis_design(name)
+    import pandas as pd
+
+    from signface.study.design import read_study
+
+    study = read_study(name, films=False)
+    rows, asked, labels = [], {}, []
+    for block in study.blocks:
+        columns = {question.column for question in block.questions}
+        own = frozenset(column for column in QUESTIONS if _CSV.get(column, column) in columns)
+        labels += [
+            choice.value
+            for question in block.questions
+            if question.column == _CSV["correct"]
+            for choice in question.choices
+        ]
+        for stimulus in block.stimuli:
+            asked[stimulus.name] = own
+            rows.append(
+                {
+                    "stimulus": stimulus.name,
+                    "expression": stimulus.expression,
+                    "intensity": stimulus.intensity,
+                    "method": stimulus.method,
+                }
+            )
+    questions = tuple(column for column in QUESTIONS if any(column in own for own in asked.values()))
+    if not questions:
+        raise SignfaceError(
+            "asks nothing that can be simulated",
+            file=name,
+            hint=f"it knows {', '.join(_CSV.get(column, column) for column in QUESTIONS)}",
+        )
+    return Design(study.name, pd.DataFrame(rows), questions, asked=asked, labels=tuple(dict.fromkeys(labels)))
 
 
 def simulate(
@@ -179,7 +223,8 @@ def simulate(
     if count < 1:
         raise SignfaceError("a study needs participants", hint="ask for at least one")
     rng = np.random.default_rng(seed)
-    stimuli, labels = design.stimuli, sorted(set(design.stimuli["expression"]))
+    stimuli = design.stimuli.reset_index(drop=True)
+    labels = sorted(set(stimuli["expression"]) | set(design.labels))
     method_place = stimuli["method"].map(methods.index).to_numpy()
     width = len(str(count))
     blocks = []
@@ -203,6 +248,9 @@ def simulate(
                 block["answer_expression"] = _recognise(block["expression"].tolist(), level, labels, rng)
             else:
                 block[question] = _rate(block, question, level, rng)
+            answered = [question in design.asked.get(name, design.questions) for name in block["stimulus"]]
+            column = _CSV.get(question, question)
+            block[column] = block[column].where(answered)
         blocks.append(block)
     table = pd.concat(blocks, ignore_index=True).assign(simulated="yes")
     columns = [REQUIRED[0], *PERSONAL, "stimulus", "expression", "intensity", "method", "answer_expression", *SCALES]

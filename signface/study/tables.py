@@ -1,7 +1,7 @@
 """A table of a study's results: what it shows, how its cells are written, and its text, CSV and LaTeX.
 
 - `StudyTable`: one table.
-- `write_cell`: one cell as a reader sees it.
+- `write_cell`: one cell as a reader sees it; `write_p`: a p-value inside a sentence.
 - `as_text`, `as_latex`: the table for a terminal and for a paper. CSV keeps the numbers unrounded.
 """
 
@@ -90,6 +90,12 @@ def write_cell(cell: object, kind: str) -> str:
     return written.lstrip("-") if float(written) == 0 else written.replace("-", "−")
 
 
+def write_p(value: float) -> str:
+    """A p-value inside a sentence: `p = 0.725`, `p < 0.001`, with spaces that do not break."""
+    written = write_cell(float(value), "p")
+    return f"p\u00a0<\u00a0{written[1:]}" if written.startswith("<") else f"p\u00a0=\u00a0{written}"
+
+
 def as_text(table: StudyTable) -> str:
     """The table with aligned columns, for a terminal."""
     above, below = table.header()
@@ -159,6 +165,8 @@ _LATEX = {
     "–": "--",
     "≥": r"$\geq$",
     "±": r"$\pm$",
+    "\u00a0": "~",
+    **{letter: f"$_{digit}$" for digit, letter in enumerate("₀₁₂₃₄₅₆₇₈₉")},
 }
 
 
