@@ -69,7 +69,7 @@ def build(train: list[Example], test: list[Example]) -> None:
         face="default",
         layout="default-40",
         corpus="synthetic (signface synth)",
-        scores={what: round(scores[section]["accuracy"], 3) for section, what in SCORED.items()},
+        scores={what: scores[section]["accuracy"] for section, what in SCORED.items()},
         name="default",
     )
     save_model(model, FOLDER / "default.skops")

@@ -15,9 +15,11 @@ from hypothesis import strategies as st
 from sklearn.preprocessing import FunctionTransformer
 
 from signface.errors import SignfaceError
+from signface.files import shipped
 from signface.label.labellers import NAMES
 from signface.label.persistence import CARD, load_model, read_card, save_model
 from signface.label.training import train_model
+from signface.label.vocabulary import AFFECTS
 from tests.hand_made import corpus, example
 
 
@@ -49,6 +51,7 @@ TRAIN = """
 import sys
 from signface.label.persistence import save_model
 from signface.label.training import train_model
+from signface.label.vocabulary import AFFECTS
 from tests.hand_made import corpus
 takes = [e for e in corpus(("S1",)) if e.kind == "IE"]
 for name in ("knn3", "svm-linear", "svm-rbf", "forest"):
@@ -149,3 +152,15 @@ def test_other_endings_and_missing_files_are_refused(saved, tmp_path):
     with pytest.raises(SignfaceError, match="no such classifier"):
         load_model(tmp_path / "absent.skops")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_shipped_classifier_fits_the_default_face_and_says_what_it_has_not_met(face):
+    file = shipped("classifiers", ".skops")["default"]
+    card = load_model("default").card
+    assert set(card.bases) == set(face.names)
+    assert card.labels == tuple(sorted(AFFECTS))
+    assert file.stat().st_size < 3e6
+    text = file.with_suffix(".md").read_text(encoding="utf-8")
+    assert "It has met no real signer." in text
+    for score in card.scores.values():
+        assert f"{score:.2f}" in text
