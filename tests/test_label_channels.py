@@ -211,7 +211,7 @@ def test_swings_are_wide_enough_and_go_back_and_forth(angle, smallest):
 
 
 def test_intensity_grows_with_the_strength_of_the_face():
-    spans = [(0.0, 1.0, "J", 0.3), (1.0, 2.0, "J", 0.8), (2.0, 3.0, "J", 1.3), (3.0, 4.0, "N", 0.0)]
+    spans = [(0.0, 1.0, "J", 0.3), (1.0, 2.0, "J", 0.6), (2.0, 3.0, "J", 0.9), (3.0, 4.0, "N", 0.0)]
     take = moving(
         mouthSmileLeft=[(a, b, w) for a, b, _, w in spans], mouthSmileRight=[(a, b, w) for a, b, _, w in spans]
     )

@@ -2,6 +2,7 @@
 
 - `write_eaf`: a file of its own, from nothing or from a lab's template.
 - `write_into`: into a file that is there, touching nothing but our own tiers.
+- `prepare_eaf`, `prepare_into`: the same up to the writing, so that every reason to refuse comes before any file.
 - `check_writable`: whether a file may be overwritten.
 """
 
@@ -12,12 +13,14 @@ import json
 import uuid
 from collections.abc import Iterable, Sequence
 from collections.abc import Mapping as MappingABC
+from dataclasses import dataclass
 from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
 
 from lxml import etree
 
+from signface.elan.checking import check_document
 from signface.elan.document import (
     PROPERTY_PREFIX,
     SCHEMA_URL,
@@ -100,22 +103,21 @@ def write_eaf(
         The segments carry no label or one outside the vocabulary; the template or the mapping does not fit; the file
         exists and someone has worked in it; it cannot be written.
     """
-    file = Path(path)
-    check_writable(file, replace=replace)
-    all_tiers = (affect_tier(segments, signer, vocabulary=vocabulary), *tiers)
-    root = _new_document() if template is None else _read_template(template)
-    root.set("AUTHOR", xml_text(author))
-    root.set("DATE", iso_date(date))
-    put_tiers(root, all_tiers, mapping=mapping, file=file if template is None else Path(template))
-    _fill_header(root, file, segments, video, properties, linked_files)
-    rows = tier_rows(root)
-    content = json.dumps([root.get("DATE"), segments.name, rows], ensure_ascii=False)
-    set_property(root, "URN", f"urn:nl-mpi-tools-elan-eaf:{uuid.uuid5(uuid.NAMESPACE_URL, content)}")
-    set_property(root, f"{PROPERTY_PREFIX}tiers", json.dumps(list(rows), ensure_ascii=False))
-    if file.is_file() and not (_untouched(file) and recorded(read_document(file).getroot()) == recorded(root)):
-        back_up(file)
-    write_document(etree.ElementTree(root), file)
-    _write_preferences(file, all_tiers, linked_files)
+    prepare_eaf(
+        path,
+        segments,
+        signer=signer,
+        video=video,
+        properties=properties,
+        vocabulary=vocabulary,
+        tiers=tiers,
+        linked_files=linked_files,
+        template=template,
+        mapping=mapping,
+        date=date,
+        author=author,
+        replace=replace,
+    ).store()
 
 
 def write_into(
@@ -158,22 +160,120 @@ def write_into(
         As `write_eaf`; or the file is broken (`checking.check_document`), a tier of ours was corrected, or
         annotations of others would be lost. The file is then as it was.
     """
-    from signface.elan.checking import check_document
+    prepared = prepare_into(
+        eaf,
+        segments,
+        signer=signer,
+        video=video,
+        properties=properties,
+        vocabulary=vocabulary,
+        tiers=tiers,
+        linked_files=linked_files,
+        mapping=mapping,
+        date=date,
+        replace=replace,
+    )
+    prepared.store()
+    return prepared.changed
 
+
+@dataclass(frozen=True)
+class PreparedDocument:
+    """A document that is complete and allowed to be written, and has not been yet.
+
+    Parameters
+    ----------
+    file : Path
+        Where it goes.
+    tree : ElementTree
+    tiers : tuple of Tier
+        What is new in it, for the colours.
+    linked_files : tuple of path
+    keep_previous : bool
+        Whether the file that is there is kept as a backup.
+    changed : bool
+        Whether there is anything to write.
+    """
+
+    file: Path
+    tree: etree._ElementTree
+    tiers: tuple[Tier, ...]
+    linked_files: tuple[str | PathLike[str], ...]
+    keep_previous: bool
+    changed: bool = True
+
+    def store(self) -> None:
+        """Write the document, its colours, and the backup of what was there."""
+        if not self.changed:
+            return
+        if self.keep_previous:
+            back_up(self.file)
+        write_document(self.tree, self.file)
+        curves = next((linked for linked in self.linked_files if str(linked).endswith(".csv")), None)
+        write_preferences(self.file.with_suffix(".pfsx"), self.tiers, curves=curves)
+
+
+def prepare_eaf(
+    path: str | PathLike[str],
+    segments: Segments,
+    *,
+    signer: str,
+    video: str | PathLike[str] | None,
+    properties: MappingABC[str, str] | None,
+    vocabulary: Vocabulary,
+    tiers: Sequence[Tier],
+    linked_files: Sequence[str | PathLike[str]],
+    template: str | PathLike[str] | None,
+    mapping: Mapping | None,
+    date: datetime.datetime | str | None,
+    author: str,
+    replace: bool,
+) -> PreparedDocument:
+    """What `write_eaf` writes, before anything is written. Parameters and errors are those of `write_eaf`."""
+    file = Path(path)
+    check_writable(file, replace=replace)
+    all_tiers = (affect_tier(segments, signer, vocabulary=vocabulary), *tiers)
+    root = _new_document() if template is None else _read_template(template)
+    root.set("AUTHOR", xml_text(author))
+    root.set("DATE", iso_date(date))
+    put_tiers(root, all_tiers, mapping=mapping, file=file if template is None else Path(template))
+    _fill_header(root, file, segments, video, properties, linked_files)
+    rows = tier_rows(root)
+    content = json.dumps([root.get("DATE"), segments.name, rows], ensure_ascii=False)
+    set_property(root, "URN", f"urn:nl-mpi-tools-elan-eaf:{uuid.uuid5(uuid.NAMESPACE_URL, content)}")
+    set_property(root, f"{PROPERTY_PREFIX}tiers", json.dumps(list(rows), ensure_ascii=False))
+    same = _untouched(file) and recorded(read_document(file).getroot()) == recorded(root)
+    return PreparedDocument(
+        file, etree.ElementTree(root), all_tiers, tuple(linked_files), keep_previous=file.is_file() and not same
+    )
+
+
+def prepare_into(
+    eaf: str | PathLike[str],
+    segments: Segments,
+    *,
+    signer: str,
+    video: str | PathLike[str] | None,
+    properties: MappingABC[str, str] | None,
+    vocabulary: Vocabulary,
+    tiers: Sequence[Tier],
+    linked_files: Sequence[str | PathLike[str]],
+    mapping: Mapping | None,
+    date: datetime.datetime | str | None,
+    replace: bool,
+) -> PreparedDocument:
+    """What `write_into` writes, before anything is written. Parameters and errors are those of `write_into`."""
     file = Path(eaf)
     tree = read_document(file)
     root = tree.getroot()
     check_document(root, file)
     all_tiers = (affect_tier(segments, signer, vocabulary=vocabulary), *tiers)
     upgrade(root)
-    if not put_tiers(root, all_tiers, mapping=mapping, replace=replace, file=file):
-        return False
-    _fill_header(root, file, segments, video, properties, linked_files)
-    root.set("DATE", iso_date(date))
-    back_up(file)
-    write_document(tree, file)
-    _write_preferences(file, all_tiers, linked_files)
-    return True
+    changed = put_tiers(root, all_tiers, mapping=mapping, replace=replace, file=file)
+    if changed:
+        _fill_header(root, file, segments, video, properties, linked_files)
+        root.set("DATE", iso_date(date))
+    return PreparedDocument(file, tree, all_tiers, tuple(linked_files), keep_previous=True, changed=changed)
 
 
 def check_writable(path: str | PathLike[str], *, replace: bool = False) -> None:
@@ -217,8 +317,6 @@ def _new_document() -> etree._Element:
 
 def _read_template(template: str | PathLike[str]) -> etree._Element:
     """The root of a template as EAF 3.0, without annotations, time slots, links between annotations and media."""
-    from signface.elan.checking import check_document
-
     root = read_document(template).getroot()
     check_document(root, Path(template))
     upgrade(root)
@@ -254,8 +352,3 @@ def _fill_header(
         details.setdefault("history", "; ".join(segments.history))
     for name, value in details.items():
         set_property(root, PROPERTY_PREFIX + name, xml_text(str(value)))
-
-
-def _write_preferences(file: Path, tiers: Sequence[Tier], linked_files: Iterable[str | PathLike[str]]) -> None:
-    curves = next((linked for linked in linked_files if str(linked).endswith(".csv")), None)
-    write_preferences(file.with_suffix(".pfsx"), tiers, curves=curves)
