@@ -191,7 +191,7 @@ def test_a_mapping_is_written_once_and_can_be_used(tmp_path, capsys):
     lab, out = tmp_path / "lab.etf", tmp_path / "mapping.toml"
     lab.write_text(LAB, "utf-8")
     assert main(["elan", "map", str(lab), "-o", str(out)]) == 0
-    assert read_mapping(out)["affect"].tier == "Emotion_S1"
+    assert read_mapping(out)["affect"].tier == "Emotion_{signer}"
     assert main(["elan", "map", str(lab), "-o", str(out)]) == 2  # an edited mapping is not lost
     assert "exists" in capsys.readouterr().err
 

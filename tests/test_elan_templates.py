@@ -378,8 +378,9 @@ def test_a_first_mapping_is_suggested_and_can_be_read(lab, tmp_path):
     path = tmp_path / "mapping.toml"
     path.write_text(text, "utf-8")
     rules = read_mapping(path)
-    assert rules["affect"].tier == "Emotion_S1"
+    assert rules["affect"].tier == "Emotion_{signer}"  # its participant is S1
     assert rules["affect"].value("N") == "neutral"
+    assert rules["affect"].value("J") == "Freude"  # by its English name, joy
     assert rules["affect"].value("NJ") is None
     assert rules["affect-confidence"].tier == "Certainty_S1"
     assert "brows" not in rules

@@ -140,7 +140,7 @@ def suggest_mapping(root: etree._Element, vocabularies: MappingABC[str, Vocabula
         Our channels and their vocabularies.
     """
     tiers = {
-        tier.get("TIER_ID") or "": closed_values(root, tier)
+        tier.get("TIER_ID") or "": tier
         for tier in root.iterfind("TIER")
         if stereotype(root, tier) in (None, "Symbolic_Association")
     }
@@ -157,8 +157,10 @@ def suggest_mapping(root: etree._Element, vocabularies: MappingABC[str, Vocabula
         if tier is None:
             lines.append('# tier = ""')
             continue
-        values = free.pop(tier)
-        lines.append(f"tier = {_toml(tier)}")
+        element = free.pop(tier)
+        participant = element.get("PARTICIPANT")
+        lines.append(f"tier = {_toml(tier.replace(participant, '{signer}') if participant else tier)}")
+        values = _names_of_values(root, element)
         if vocabulary is None or values is None:
             continue
         lines.append(f"# {tier} holds one of: {', '.join(values)}")
@@ -184,10 +186,10 @@ def _closest_tier(channel: str, tiers: list[str]) -> str | None:
     return None
 
 
-def _closest_value(label: str, description: str, values: list[str]) -> str | None:
-    """The value that is the label, a word for it, or written almost like it."""
+def _closest_value(label: str, description: str, values: dict[str, list[str]]) -> str | None:
+    """The value that in some language is the label, a word for it, or written almost like it."""
     words = (label.lower(), *LABEL_WORDS.get(label, ()), description.lower())
-    lower = {value.lower(): value for value in reversed(values)}
+    lower = {name.lower(): value for value, names in reversed(values.items()) for name in names}
     for word in words:
         if word in lower:
             return lower[word]
@@ -206,10 +208,21 @@ def stereotype(root: etree._Element, tier: etree._Element) -> str | None:
     return None
 
 
-def closed_values(root: etree._Element, tier: etree._Element) -> list[str] | None:
-    """The values that a tier's closed vocabulary holds; None where it has none in the file."""
+def _names_of_values(root: etree._Element, tier: etree._Element) -> dict[str, list[str]] | None:
+    """The values that a tier's closed vocabulary holds, and how each is called in every language."""
     entries = closed_entries(root, tier)
-    return None if entries is None else list(entries)
+    if entries is None:
+        return None
+    names: dict[str, list[str]] = {}
+    for value, identifier in entries.items():
+        others = [
+            name.text or ""
+            for entry in root.iterfind("CONTROLLED_VOCABULARY/CV_ENTRY_ML")
+            if entry.get("CVE_ID") == identifier and any((v.text or "") == value for v in entry.iterfind("CVE_VALUE"))
+            for name in entry.iterfind("CVE_VALUE")
+        ]
+        names[value] = [value, *others]
+    return names
 
 
 def closed_entries(root: etree._Element, tier: etree._Element) -> dict[str, str] | None:
