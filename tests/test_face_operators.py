@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from signface.face.layout_files import read_layout
-from signface.face.operators import stiffness_and_mass
+from signface.face.operators import stiffness_and_mass, thin_shell_matrices
 from signface.face.reading import read_face
 from signface.face.subdivision import subdivide
 
@@ -35,3 +35,10 @@ def test_subdivision_keeps_area_vertices_and_the_motion_of_markers(face):
     assert (fine.mesh.vertices[: len(face.mesh.vertices)] == face.mesh.vertices).all()
     coarse, dense = (read_layout("default-40", own).bases(own) for own in (face, fine))
     assert np.abs(coarse - dense).max() < 1e-4  # millimetres: the layout is written to 1e-5
+
+
+def test_stretching_and_bending_hardly_change_with_the_mesh(face):
+    for coarse, fine in zip(thin_shell_matrices(face), thin_shell_matrices(subdivide(face))):
+        assert np.linalg.eigvalsh(coarse).min() > -1e-9 * np.trace(coarse)
+        assert np.diag(fine) == pytest.approx(np.diag(coarse), rel=0.2)
+        assert np.diag(fine).mean() == pytest.approx(np.diag(coarse).mean(), rel=0.06)

@@ -12,6 +12,9 @@ from scipy import sparse
 from signface.face.mesh import Mesh
 from signface.face.model import FaceModel
 
+#: The scale at which bending is measured, as a share of the square root of the skin's area: 7 mm on the default face.
+RESOLUTION = 0.02
+
 
 def stiffness_and_mass(mesh: Mesh) -> tuple[sparse.csr_matrix, np.ndarray]:
     """The cotangent Laplacian of a mesh and the area around each vertex (seed 001, eq. 5.11 and 5.12).
@@ -45,19 +48,28 @@ def thin_shell_matrices(face: FaceModel) -> tuple[np.ndarray, np.ndarray]:
     energy of eq. 5.15 is `k_s d' S d + k_b d' S M^-1 S d`, summed over the three coordinates; here as quadratic forms
     of the weights.
 
+    A base is known at the vertices and linear between them, and such a function has a kink at every edge, whose bending
+    is without limit: `M^-1` doubles the energy each time the mesh is split. The bending is therefore measured at a
+    resolution `h`, as `S (M + h^2 S)^-1 S`, with `h` the `RESOLUTION` of the skin: waves much longer than `h` count as
+    in eq. 5.15, shorter ones by their slope, and the value no longer depends on how finely the face is meshed.
+
     Returns
     -------
     stretching : (N, N) array
         `b_i' S b_j`, square millimetres; positive semidefinite.
     bending : (N, N) array
-        `b_i' S M^-1 S b_j`, without unit; positive semidefinite.
+        `b_i' S (M + h^2 S)^-1 S b_j`, without unit; positive semidefinite.
     """
+    from scipy.sparse.linalg import splu
+
     stiffness, mass = stiffness_and_mass(face.mesh)
     count, vertices = face.n_bases, len(mass)
     columns = face.bases.transpose(1, 0, 2).reshape(vertices, 3 * count)
     stiff = stiffness @ columns
-    stretching = np.einsum("vid,vjd->ij", columns.reshape(vertices, count, 3), stiff.reshape(vertices, count, 3))
-    inverse = np.divide(1.0, np.sqrt(mass), where=mass > 0, out=np.zeros(vertices))  # a loose vertex has no skin
-    curved = (stiff * inverse[:, None]).reshape(vertices, count, 3)
-    bending = np.tensordot(curved, curved, axes=((0, 2), (0, 2)))
+    smoothing = sparse.diags(mass) + RESOLUTION**2 * mass.sum() * stiffness
+    smooth = splu(smoothing.tocsc()).solve(stiff)
+    stretching, bending = (
+        np.tensordot(left.reshape(vertices, count, 3), right.reshape(vertices, count, 3), axes=((0, 2), (0, 2)))
+        for left, right in ((columns, stiff), (stiff, smooth))
+    )
     return 0.5 * (stretching + stretching.T), 0.5 * (bending + bending.T)
