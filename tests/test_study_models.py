@@ -14,6 +14,7 @@ from signface.study.intervals import difference_intervals, participant_interval
 from signface.study.mixed_models import OrdinalMixedModel
 from signface.study.model_tables import compare_methods
 from signface.study.power import participants_needed, smallest_difference
+from signface.study.random_effects import Levels
 from signface.study.responses import validate
 from signface.study.simulation import Effects, crossed_design, simulate
 
@@ -137,3 +138,26 @@ def test_power_is_that_of_a_simulated_study():
     rng, difference = np.random.default_rng(1), smallest_difference(1.0, 30)
     found = [wilcoxon(rng.normal(difference, 1, 30), np.zeros(30)).p < 0.05 for _ in range(400)]
     assert np.mean(found) == pytest.approx(0.8, abs=0.06)
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.integers(2, 6), st.integers(1, 3), st.integers(1, 4), st.integers(0, 2**32 - 1))
+def test_the_block_system_is_the_written_out_one(people, methods, stimuli, seed):
+    rng = np.random.default_rng(seed)
+    kept = rng.random(people * methods * stimuli) < 0.8  # participants who stopped: blocks of unequal size
+    who, how, what = (axis.ravel()[kept] for axis in np.indices((people, methods, stimuli)))
+    if not len(who):
+        return
+    levels = Levels(len(who), [what, who * 10 + how, who])
+    table = np.zeros((len(who), levels.size))
+    table[np.arange(len(who))[:, None], levels.columns] = 1
+    weights, scale = rng.random(len(who)), levels.of_groups(rng.random(3) + 0.2)
+    written = scale[:, None] * (table.T * weights @ table) * scale + np.eye(levels.size)
+    ours, inverse, right = levels.hessian(weights, scale), np.linalg.inv(written), rng.random(levels.size)
+    assert ours.log_determinant == pytest.approx(np.linalg.slogdet(written)[1])
+    assert ours.solve(right) == pytest.approx(inverse @ right)
+    scaled = table * scale
+    assert ours.leverage() == pytest.approx(np.einsum("ij,jk,ik->i", scaled, inverse, scaled))
+    assert ours.trace() == pytest.approx(np.diag(inverse @ (scale[:, None] * (table.T * weights @ table))))
+    assert levels.spread(right) == pytest.approx(table @ right)
+    assert levels.gather(weights) == pytest.approx(table.T @ weights)

@@ -52,10 +52,10 @@ READING = (
     "in each group, Scheirer-Ray-Hare 5 in each cell, Wilcoxon 20 pairs that differ. Where one is not met, the table "
     "says so.",
     "All these tests take answers, or pairs of answers, as independent of each other. They are not: a participant "
-    "gives many. For age, gender, vision or habit, which belong to the participant, they find differences that are not "
-    "there; for methods, they do so when participants react to a method each in their own way, and hide differences when they "
-    "do not. The part with participants as random effects, the column “p over participants” and the intervals over "
-    "participants do not make that assumption; where the two disagree, trust them.",
+    "gives many. For age, gender, vision or habit, which belong to the participant, they find differences that "
+    "are not there; for methods, they do so when participants react to a method each in their own way, and hide "
+    "differences when they do not. The part with participants as random effects, the column “p over participants” "
+    "and the intervals over participants do not make that assumption; where the two disagree, trust them.",
     "Where several hypotheses are tested at once, p (Holm) keeps the chance of any false alarm among them below the "
     "level.",
 )

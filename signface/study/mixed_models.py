@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from signface.errors import SignfaceError
+from signface.study.random_effects import Levels
 
 Array = NDArray[np.float64]
 
@@ -91,19 +92,10 @@ class OrdinalMixedModel:
             raise SignfaceError("an ordinal model needs two different answers", hint="leave this question out")
         self._fixed = np.asarray(fixed, float)
         self._cuts = len(values) - 1
-        # each answer belongs to one level of each grouping: its columns of Z, which is never written out
-        columns: list[NDArray[np.intp]] = []
-        sizes: list[int] = []
-        for grouping in groupings:
-            level = np.unique(np.asarray(grouping).astype(str), return_inverse=True)[1]
-            columns.append(level + sum(sizes))
-            sizes.append(int(level.max()) + 1)
-        self._columns = np.column_stack(columns) if columns else np.zeros((len(self._place), 0), int)
-        self._owner = np.repeat(np.arange(len(sizes)), sizes)
-        self._groups = len(sizes)
+        self._levels = Levels(len(self._place), groupings)
         # which threshold bounds an answer above and below: index 0 is −∞, the last +∞
         self._above, self._below = self._place + 1, self._place
-        self._modes = np.zeros(len(self._owner))
+        self._modes = np.zeros(self._levels.size)
 
     def fit(self) -> OrdinalFit:
         """Maximise the likelihood."""
@@ -118,9 +110,14 @@ class OrdinalMixedModel:
         shares = np.cumsum(np.bincount(self._place))[:-1] / len(self._place)
         start_cuts = np.log(shares / (1 - shares))
         start = np.concatenate(
-            [start_cuts[:1], np.log(np.diff(start_cuts)), np.zeros(self._fixed.shape[1]), np.full(self._groups, 0.5)]
+            [
+                start_cuts[:1],
+                np.log(np.diff(start_cuts)),
+                np.zeros(self._fixed.shape[1]),
+                np.full(self._levels.groups, 0.5),
+            ]
         )
-        self._modes = np.zeros(len(self._owner))
+        self._modes = np.zeros(self._levels.size)
         found = minimize(self._negative, start, jac=True, method="BFGS", options={"gtol": 1e-4, "maxiter": MOST_STEPS})
         information = self._information(found.x)
         gradient = np.abs(self._negative(found.x)[1]).max()
@@ -148,7 +145,7 @@ class OrdinalMixedModel:
         matrix = (matrix + matrix.T) / 2
         # a spread at zero is a border, where the likelihood may be flat: its row tells nothing about the others
         flat = np.abs(point) < 1e-3
-        flat[: len(point) - self._groups] = False
+        flat[: len(point) - self._levels.groups] = False
         matrix[flat] = matrix[:, flat] = 0
         matrix[flat, flat] = 1
         return matrix
@@ -167,26 +164,20 @@ class OrdinalMixedModel:
         cuts, width = self._cuts, self._fixed.shape[1]
         thetas = self._thresholds(point[:cuts])
         spreads = point[cuts + width :]
-        scale = spreads[self._owner] if self._groups else np.zeros(0)
+        levels = self._levels
+        scale = levels.of_groups(spreads)
         base = self._fixed @ point[cuts : cuts + width]
         modes = self._find_modes(thetas, base, scale)
-        curves = _Curves(thetas, base + self._spread(scale * modes), self._above, self._below)
-        weighted = self._squared(curves.weight)
-        hessian = scale[:, None] * weighted * scale + np.eye(len(modes))
-        factor = np.linalg.cholesky(hessian)
-        value = curves.log.sum() - 0.5 * modes @ modes - np.log(np.diag(factor)).sum()
+        curves = _Curves(thetas, base + levels.spread(scale * modes), self._above, self._below)
+        hessian = levels.hessian(curves.weight, scale)
+        value = curves.log.sum() - 0.5 * modes @ modes - 0.5 * hessian.log_determinant
 
         # The gradient has three parts: the answers' own, that of ½log|H| at a fixed mode, and that of ½log|H| through
         # the mode. `leverage` is z_i'H⁻¹z_i of each answer; `along` carries a change of modes to a change of ½log|H|.
-        inverse = np.linalg.inv(hessian)
-        spread_inverse = scale[:, None] * inverse * scale
-        leverage = np.zeros(len(base))
-        for first in self._columns.T:
-            for second in self._columns.T:
-                leverage += spread_inverse[first, second]
+        leverage = hessian.leverage()
         slope = 0.5 * leverage * curves.weight_eta
-        along = inverse @ (scale * self._gathered(slope))
-        through = self._spread(scale * along)
+        along = hessian.solve(scale * levels.gather(slope))
+        through = levels.spread(scale * along)
         # A change dη of the linear predictor (at fixed modes) moves the modes by −H⁻¹Λ'Z'W dη.
         by_eta = curves.eta - slope + through * curves.weight
         gradient_fixed = self._fixed.T @ by_eta
@@ -198,37 +189,15 @@ class OrdinalMixedModel:
         tails = np.cumsum(by_theta[::-1])[::-1]
         gradient_theta = np.concatenate([tails[:1], tails[1:] * gaps])
         # spreads: η moves by Z_g z_g; Λ itself stands in H and in the mode's equation Λ'Z's = z
-        gradient_spread = np.zeros(self._groups)
-        score = self._gathered(curves.eta)
-        trace = np.einsum("kj,jk->k", inverse * scale, weighted)
-        for group in range(self._groups):
-            own = self._owner == group
-            direct = by_eta @ modes[self._columns[:, group]]
-            gradient_spread[group] = direct - trace[own].sum() - along[own] @ score[own]
+        score, trace = levels.gather(curves.eta), hessian.trace()
+        gradient_spread = np.zeros(levels.groups)
+        for group, column in enumerate(levels.columns.T):
+            own = np.unique(column)
+            gradient_spread[group] = by_eta @ modes[column] - trace[own].sum() - along[own] @ score[own]
         gradient = np.concatenate([gradient_theta, gradient_fixed, gradient_spread])
         if not np.isfinite(value):
             return 1e10, np.zeros_like(gradient)
         return -float(value), -gradient
-
-    def _spread(self, effects: Array) -> Array:
-        """Z times the random effects: what they add to each answer, (n,)."""
-        return effects[self._columns].sum(axis=1)
-
-    def _gathered(self, values: Array) -> Array:
-        """Z' times values of the answers: their sum by level, (levels,)."""
-        total = np.zeros(len(self._owner))
-        for column in self._columns.T:
-            total += np.bincount(column, values, len(total))
-        return total
-
-    def _squared(self, weights: Array) -> Array:
-        """Z' diag(weights) Z, (levels, levels)."""
-        size = len(self._owner)
-        total = np.zeros(size * size)
-        for first in self._columns.T:
-            for second in self._columns.T:
-                total += np.bincount(first * size + second, weights, size * size)
-        return total.reshape(size, size)
 
     def _find_modes(self, thetas: Array, base: Array, scale: Array) -> Array:
         """The random effects of largest joint density, by Newton's method with halved steps."""
@@ -237,7 +206,7 @@ class OrdinalMixedModel:
         modes = self._modes.copy()
 
         def joint(at: Array) -> tuple[float, _Curves]:
-            curves = _Curves(thetas, base + self._spread(scale * at), self._above, self._below)
+            curves = _Curves(thetas, base + self._levels.spread(scale * at), self._above, self._below)
             return float(curves.log.sum() - 0.5 * at @ at), curves
 
         height, curves = joint(modes)
@@ -245,10 +214,10 @@ class OrdinalMixedModel:
             modes = np.zeros_like(modes)
             height, curves = joint(modes)
         for _ in range(50):
-            slope = scale * self._gathered(curves.eta) - modes
+            slope = scale * self._levels.gather(curves.eta) - modes
             if np.abs(slope).max() < 1e-9:
                 break
-            step = np.linalg.solve(scale[:, None] * self._squared(curves.weight) * scale + np.eye(len(modes)), slope)
+            step = self._levels.hessian(curves.weight, scale).solve(slope)
             for _ in range(30):
                 taller, new = joint(modes + step)
                 if taller >= height - 1e-12:
