@@ -286,3 +286,9 @@ def test_elans_short_numbers_lose_no_millisecond(tmp_path, step):
 def test_every_file_of_this_module_is_valid(corpus):
     for file in corpus.glob("*.eaf"):
         assert_valid(file)
+
+
+def test_a_take_held_out_is_not_learnt_from_by_another_road(corpus, machine, tmp_path, capsys):
+    arguments = ["--before", str(machine), "--classifier", "knn1", "--with", str(corpus)]
+    assert main(["elan", "learn", str(corpus), "-o", str(tmp_path / "mine.skops"), *arguments]) == 0
+    assert "3 takes of the same name in --with are left out" in capsys.readouterr().out

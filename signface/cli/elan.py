@@ -178,7 +178,12 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
 
     before = load_model(arguments.before)
     corrected = solved(arguments.corpus)
+    known_names = {example.take.rpartition("/")[2] for example in corrected}
     others = [example for folder in arguments.others for example in solved(folder)]
+    apart = [example for example in others if example.take.rpartition("/")[2] not in known_names]
+    if len(apart) < len(others):  # a take held out must not be learnt from by another road
+        print(f"{len(others) - len(apart)} takes of the same name in --with are left out")
+    others = apart
     scores = {}
     if len(corrected) > 1:
         labels = held_out_labels(corrected, before, others=others, classifier=arguments.classifier, seed=arguments.seed)
