@@ -215,12 +215,12 @@ class OrdinalMixedModel:
             height, curves = joint(modes)
         for _ in range(50):
             slope = scale * self._levels.gather(curves.eta) - modes
-            if np.abs(slope).max() < 1e-9:
+            if np.abs(slope).max() < 1e-8:
                 break
             step = self._levels.hessian(curves.weight, scale).solve(slope)
             for _ in range(30):
                 taller, new = joint(modes + step)
-                if taller >= height - 1e-12:
+                if taller >= height - 1e-12 * (1 + abs(height)):  # rounding of a sum of thousands of terms
                     break
                 step = step / 2
             modes, height, curves = modes + step, taller, new
