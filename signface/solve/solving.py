@@ -17,10 +17,10 @@ from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.solve.adaptation import MorphologicalAdaptation, SimilarityAdaptation, make_adaptation
 from signface.solve.methods import make_solver
+from signface.solve.resting import resting_time
 from signface.takes.filtering import CUTOFF_HZ, lowpass
 from signface.takes.gaps import LONG_S, SHORT_S, fill_gaps
 from signface.takes.labels import rename_to
-from signface.takes.neutral import find_neutral
 from signface.takes.stabilisation import align_neutral, stabilise
 from signface.takes.take import Take
 
@@ -80,7 +80,7 @@ def prepare_take(
     labels = [label for label in layout.face_labels if label in clean.labels]
     head = [label for label in layout.head_labels if label in clean.labels]
     if neutral == "auto":
-        time = find_neutral(clean, labels, head=head)
+        time = resting_time(clean, face, layout, adaptation=adaptation)
         found = "found"
     else:
         time, found = float(neutral), "given"

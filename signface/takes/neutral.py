@@ -1,12 +1,14 @@
 """Finding a neutral frame: where the face rests.
 
 - `find_neutral`: the time of a neutral frame in seconds.
+- `neutral_candidates`: a time for each pose in which the face rests, where more than stillness can choose.
 """
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +19,9 @@ from signface.takes.take import Take
 
 #: Speeds are means over this long, in seconds; a shorter rest is no rest.
 SMOOTHING_S, SHORTEST_S = 0.1, 0.2
+
+#: Still stretches whose mean poses are nearer than this (root mean square over the markers, mm) are one pose.
+SAME_POSE_MM = 0.3
 
 
 def _without_motion(positions: np.ndarray, head: np.ndarray) -> np.ndarray:
@@ -71,6 +76,66 @@ def find_neutral(take: Take, labels: Sequence[str] | None = None, *, head: Seque
     SignfaceError
         No frame shows three markers.
     """
+    return _longest_nearest(take, _motion(take, labels, head))
+
+
+def _longest_nearest(take: Take, motion: _Motion) -> float:
+    """The time that `find_neutral` gives."""
+    away, stretches = motion.away, motion.stretches
+    if not stretches:
+        return motion.fallback
+    distance = np.array([np.mean(away[begin:end]) for begin, end in stretches])
+    duration = np.array([(end - begin) / take.rate for begin, end in stretches])
+    scale = max(0.5, float(distance.min()))
+    begin, end = stretches[int(np.argmax(duration / (1 + (distance / scale) ** 2)))]
+    return float(take.time[begin + _most_typical(motion.poses[begin:end])])
+
+
+def neutral_candidates(
+    take: Take, labels: Sequence[str] | None = None, *, head: Sequence[str] | None = None, most: int = 8
+) -> list[float]:
+    """Times at which the face rests, one for each pose that it rests in, the longest rest first.
+
+    Parameters are those of `find_neutral`; at most `most` times are given, and always the one of `find_neutral`.
+    """
+    motion = _motion(take, labels, head)
+    times = [_longest_nearest(take, motion)]
+    kept: list[np.ndarray] = []
+    for begin, end in sorted(motion.stretches, key=lambda stretch: stretch[0] - stretch[1]):
+        rest = motion.poses[begin:end]
+        mean = np.nanmean(rest, axis=0)
+        if all(np.sqrt(np.nanmean(np.sum((mean - other) ** 2, axis=1))) > SAME_POSE_MM for other in kept):
+            kept.append(mean)
+            times.append(float(take.time[begin + _most_typical(rest)]))
+        if len(kept) == most:
+            break
+    return list(dict.fromkeys(times))
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """How a face moves on its head.
+
+    Parameters
+    ----------
+    poses : (F, M, 3) array
+        Markers without head motion, mm.
+    away : (F,) array
+        Distance from the median pose, mm; NaN for frames that cannot be neutral ones.
+    stretches : list of (int, int)
+        First frame, and frame after the last, of each still stretch.
+    fallback : float
+        The best time where there is no still stretch.
+    """
+
+    poses: np.ndarray
+    away: np.ndarray
+    stretches: list[tuple[int, int]]
+    fallback: float
+
+
+def _motion(take: Take, labels: Sequence[str] | None, head: Sequence[str] | None) -> _Motion:
+    """The face's motion and its still stretches; raises as `find_neutral` does."""
     names = [label for label in (take.labels if labels is None else labels) if label in take.labels]
     carriers = [label for label in head or () if label in take.labels]
     positions = take.select(names)
@@ -82,12 +147,12 @@ def find_neutral(take: Take, labels: Sequence[str] | None = None, *, head: Seque
         raise SignfaceError("no frame shows three markers", file=take.name, hint="give the neutral time in seconds")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # markers or frames that are missing throughout
-        still_head = _without_motion(positions, carried)
-        median = np.nanmedian(still_head, axis=0)
-        away = np.sqrt(np.nanmean(np.sum((still_head - median) ** 2, axis=2), axis=1))
+        poses = _without_motion(positions, carried)
+        median = np.nanmedian(poses, axis=0)
+        away = np.sqrt(np.nanmean(np.sum((poses - median) ** 2, axis=2), axis=1))
         if take.n_frames == 1:
-            return take.start
-        steps = np.sqrt(np.nanmean(np.sum(np.diff(still_head, axis=0) ** 2, axis=2), axis=1)) * take.rate
+            return _Motion(poses, away, [], take.start)
+        steps = np.sqrt(np.nanmean(np.sum(np.diff(poses, axis=0) ** 2, axis=2), axis=1)) * take.rate
     share = seen.mean(axis=1)
     # A neutral frame shows nearly all that can be seen, and all head markers: the others are measured against it.
     least = carrying[usable].max() if len(carriers) >= 3 else 3
@@ -95,15 +160,16 @@ def find_neutral(take: Take, labels: Sequence[str] | None = None, *, head: Seque
     speed = _rolling_mean(np.append(steps, steps[-1]), max(1, round(SMOOTHING_S * take.rate)))
     known = np.isfinite(speed) & np.isfinite(away)
     if not known.any():
-        return float(take.time[np.nanargmin(away)] if np.isfinite(away).any() else take.time[np.argmax(usable)])
+        best = np.nanargmin(away) if np.isfinite(away).any() else np.argmax(usable)
+        return _Motion(poses, away, [], float(take.time[best]))
     still = known & (speed <= np.quantile(speed[known], 1 / 3))
-    stretches = [(b, e) for b, e in runs(still) if e - b >= SHORTEST_S * take.rate]
-    if not stretches:
-        return float(take.time[np.nanargmin(np.where(known, away, np.nan))])
-    distance = np.array([np.mean(away[begin:end]) for begin, end in stretches])
-    duration = np.array([(end - begin) / take.rate for begin, end in stretches])
-    scale = max(0.5, float(distance.min()))
-    begin, end = stretches[int(np.argmax(duration / (1 + (distance / scale) ** 2)))]
-    rest = still_head[begin:end]
-    own = np.sqrt(np.nanmean(np.sum((rest - np.nanmedian(rest, axis=0)) ** 2, axis=2), axis=1))
-    return float(take.time[begin + int(np.nanargmin(own))])
+    stretches = [(int(begin), int(end)) for begin, end in runs(still) if end - begin >= SHORTEST_S * take.rate]
+    return _Motion(poses, away, stretches, float(take.time[np.nanargmin(np.where(known, away, np.nan))]))
+
+
+def _most_typical(rest: np.ndarray) -> int:
+    """Index of the frame of a stretch that is nearest to the stretch's own median pose."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        own = np.sqrt(np.nanmean(np.sum((rest - np.nanmedian(rest, axis=0)) ** 2, axis=2), axis=1))
+    return int(np.nanargmin(own))
