@@ -69,6 +69,9 @@ class MarkerBases:
     face : FaceModel
     layout : MarkerLayout
         Its P face markers are used.
+    skin : bool
+        Whether the solver also weighs the skin between the markers, as a thin shell does: bases must then differ
+        somewhere on the skin, not at the markers, and few markers will do.
 
     Attributes
     ----------
@@ -83,10 +86,11 @@ class MarkerBases:
     Raises
     ------
     SignfaceError
-        There are too few markers, no base is observed, or observed bases are linearly dependent at the markers.
+        There are too few markers, no base is observed, or observed bases are linearly dependent at the markers (with
+        `skin`, on the whole skin).
     """
 
-    def __init__(self, face: FaceModel, layout: MarkerLayout) -> None:
+    def __init__(self, face: FaceModel, layout: MarkerLayout, *, skin: bool = False) -> None:
         bases = layout.bases(face)
         self.names = face.names
         self.face_name = face.name
@@ -107,22 +111,25 @@ class MarkerBases:
         typical = np.median(energy[energy > 1e-12 * energy.max()])
         self.observed = energy > OBSERVED_SHARE**2 * typical
         self.scale = float(energy[self.observed].mean())
-        self._check_independent(layout)
+        if skin:
+            everywhere = face.bases[self.observed].reshape(int(self.observed.sum()), -1).T
+            self._check_independent(everywhere, f"on the skin of {face.name}")
+        else:
+            self._check_independent(self.matrix[:, self.observed], f"at the markers of the layout {layout.name}")
 
-    def _check_independent(self, layout: MarkerLayout) -> None:
-        """Raise when observed bases are linearly dependent at the markers, naming them.
+    def _check_independent(self, columns: np.ndarray, where: str) -> None:
+        """Raise when observed bases, given as (k, n) columns, are linearly dependent, naming them.
 
         Of two bases that are exactly opposed (an eye turned in and out), weights of 0 or more tell which one acts:
         that is no ambiguity, and only one of them is looked at.
         """
-        columns = self.matrix[:, self.observed]
         names = np.array(self.names)[self.observed]
         length = np.linalg.norm(columns, axis=0)
         opposed = (np.triu((columns / length).T @ (columns / length), k=1) < OPPOSED).any(axis=0)
         columns, names = columns[:, ~opposed], names[~opposed]
-        if 3 * self.n_markers < columns.shape[1]:
+        if len(columns) < columns.shape[1]:
             raise SignfaceError(
-                f"{self.n_markers} face markers of the layout {layout.name} (3 coordinates each) cannot tell apart"
+                f"{self.n_markers} face markers (3 coordinates each) cannot tell apart"
                 f" the {columns.shape[1]} bases of {self.face_name} that move them",
                 hint=f"use at least {-(-columns.shape[1] // 3)} face markers",
             )
@@ -133,8 +140,7 @@ class MarkerBases:
             involved = names[share > 0.05 * share.max()]
             listed = ", ".join(involved[:8]) + (f" and {len(involved) - 8} more" if len(involved) > 8 else "")
             raise SignfaceError(
-                f"bases of {self.face_name} are linearly dependent at the markers of the layout {layout.name}:"
-                f" {listed}",
+                f"bases of {self.face_name} are linearly dependent {where}: {listed}",
                 hint="drop one of them from the face, or add markers that tell them apart",
             )
 

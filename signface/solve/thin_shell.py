@@ -62,7 +62,8 @@ class ThinShellSolver:
     Raises
     ------
     SignfaceError
-        `alpha` or `sparsity` is out of range, there are too few markers, or bases are linearly dependent there.
+        `alpha` or `sparsity` is out of range, there are too few markers, or bases are linearly dependent on the skin
+        (with `alpha` 0, at the markers).
 
     Examples
     --------
@@ -91,7 +92,7 @@ class ThinShellSolver:
             raise SignfaceError(f"sparsity must be 0 or more, not {sparsity}")
         self.names = face.names
         self.alpha, self.sparsity, self.threads = float(alpha), float(sparsity), threads
-        self.markers = MarkerBases(face, layout)
+        self.markers = MarkerBases(face, layout, skin=self.alpha > 0.0)
         observed = self.markers.observed
         shell = np.zeros((int(observed.sum()),) * 2)
         for part in thin_shell_matrices(face):
