@@ -151,6 +151,16 @@ def test_names_from_a_csv_cannot_put_markup_into_the_page(real):
     assert "&lt;script&gt;" in page
 
 
+def test_methods_with_awkward_names_have_files_of_their_own(tmp_path):
+    table = simulate(thesis_design("group-1"), participants=5).replace(
+        {"LSTS30": "../x", "LSTS50": "..:x", "LSTS70": "$x" * 150}
+    )
+    analysis = analyse(validate(table.replace({"method": {"LSTS30": "../x"}})), resamples=100)
+    write_report(analysis, tmp_path / "out")
+    assert len(list((tmp_path / "out" / "tables").glob("confusion_*.csv"))) == 3
+    assert {file.name for file in tmp_path.iterdir()} == {"out"}
+
+
 def test_two_runs_write_the_same_bytes(real, tmp_path):
     first, second = write_report(real, tmp_path / "a"), write_report(real, tmp_path / "b")
     assert first.read_bytes() == second.read_bytes()

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#444444")
 MARKS = ("o", "s", "D", "^", "v", "P", "X")
 
+#: Letters of a method's name that figures have room for.
+LONGEST_NAME = 18
+
 _STYLE: dict[Any, Any] = {
     "font.size": 10,
     "font.family": "DejaVu Sans",
@@ -37,6 +40,7 @@ _STYLE: dict[Any, Any] = {
     "axes.titleweight": "bold",
     "svg.hashsalt": "signface",  # the same figure gives the same bytes
     "svg.fonttype": "path",
+    "text.parse_math": False,  # a method's name may hold a dollar
 }
 
 
@@ -82,7 +86,7 @@ def means_figure(responses: Responses, *, resamples: int, seed: int) -> str:
                     color="#333333",
                 )
             axes.set_title(name)
-            axes.set_xticks(range(len(methods)), methods, rotation=30 if max(map(len, methods)) > 5 else 0)
+            axes.set_xticks(range(len(methods)), map(_short, methods), rotation=30 if max(map(len, methods)) > 5 else 0)
             axes.set_xlim(-0.6, len(methods) - 0.2)
             axes.yaxis.grid(True, color="#e6e6e6")
             axes.set_axisbelow(True)
@@ -105,7 +109,7 @@ def differences_figure(responses: Responses, contrasts: StudyTable, models: Stud
     questions = responses.questions
     with _style():
         rows = max((contrasts.frame["", "question"] == name).sum() for name in questions.values())
-        longest = max(len(pair) for pair in contrasts.frame["", "pair"])
+        longest = min(2 * LONGEST_NAME + 3, max(len(pair) for pair in contrasts.frame["", "pair"]))
         figure = _figure(1.9 * len(questions) + 0.085 * longest + 1.2, 0.42 * rows + 1.1)
         panels = figure.subplots(1, len(questions), squeeze=False, sharey=True)[0]
         for axes, name in zip(panels, questions.values()):
@@ -128,7 +132,7 @@ def differences_figure(responses: Responses, contrasts: StudyTable, models: Stud
                 )
             axes.axvline(0, color="#888888", linewidth=1)
             axes.set_title(name)
-            axes.set_yticks(range(len(own)), own["", "pair"])
+            axes.set_yticks(range(len(own)), [" – ".join(map(_short, pair.split(" – "))) for pair in own["", "pair"]])
             axes.set_ylim(rows - 0.5, -0.5)
             axes.xaxis.grid(True, color="#e6e6e6")
             axes.set_axisbelow(True)
@@ -170,7 +174,7 @@ def confusion_figure(responses: Responses) -> str:
                 )
             axes.set_xticks(range(len(counts.columns)), counts.columns, rotation=_rotation(counts.columns))
             axes.set_yticks(range(len(counts.index)), counts.index)
-            axes.set_title(method)
+            axes.set_title(_short(method))
             axes.set_xlabel("answered")
             if (place - 1) % columns == 0:
                 axes.set_ylabel("played")
@@ -199,7 +203,7 @@ def expressions_figure(responses: Responses) -> str:
                     MARKS[row % len(MARKS)],
                     color=COLOURS[row % len(COLOURS)],
                     markersize=6,
-                    label=method,
+                    label=_short(method),
                 )
             _between(axes, len(expressions))
             axes.set_title(name)
@@ -214,6 +218,11 @@ def expressions_figure(responses: Responses) -> str:
         figure.legend(handles, labels, loc="outside lower center", ncols=len(methods), frameon=False)
         _mark(figure, responses)
         return _svg(figure, "Means by played expression and method")
+
+
+def _short(name: str) -> str:
+    """A method's name as a figure has room for it."""
+    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1]}…"
 
 
 def _between(axes: Axes, count: int) -> None:

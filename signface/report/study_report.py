@@ -39,7 +39,6 @@ SHORT = {
     "interactions": "Interactions",
     "expressions": "Expressions",
     "participants": "Participants",
-    "power": "Power",
 }
 
 READING = (
@@ -93,6 +92,7 @@ def write_report(
     folder = Path(folder)
     figures = _figures(analysis)
     page = report_html(analysis, title=title, screenshots=screenshots, figures=figures)
+    taken: set[str] = set()
     for table in analysis.tables:
         frame = table.frame.copy()
         frame.columns = [
@@ -102,7 +102,7 @@ def write_report(
         if analysis.responses.simulated:
             frame["simulated"] = "yes"
             table = replace(table, title=f"SIMULATED ANSWERS. {table.title}")
-        name = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in table.key)
+        name = _file_name(table.key, taken)
         with whole_file(folder / "tables" / f"{name}.csv") as path:
             frame.to_csv(path, index=False)
         with whole_file(folder / "tables" / f"{name}.tex") as path:
@@ -113,6 +113,17 @@ def write_report(
     with whole_file(folder / "report.html") as path:
         path.write_text(page, encoding="utf-8")
     return folder / "report.html"
+
+
+def _file_name(key: str, taken: set[str]) -> str:
+    """A table's key as a file's name that no other table has; methods are named by users."""
+    plain = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in key)[:80]
+    name, number = plain, 1
+    while name.lower() in taken:
+        number += 1
+        name = f"{plain}_{number}"
+    taken.add(name.lower())
+    return name
 
 
 def report_html(

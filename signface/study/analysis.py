@@ -39,7 +39,7 @@ class Section:
     Parameters
     ----------
     key : str
-        `methods`, `interactions`, `confusion`, `participants`, `models` or `power`.
+        `methods`, `models`, `interactions`, `expressions` or `participants`.
     title, intro : str
         A heading and what the part answers, in a sentence or two.
     tables : tuple of StudyTable

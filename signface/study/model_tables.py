@@ -25,7 +25,7 @@ from signface.study.rank_tests import dunn, friedman, wilcoxon
 from signface.study.responses import Responses
 from signface.study.tables import StudyTable
 from signface.study.test_result import TestResult
-from signface.study.thesis_tables import RESULT_KINDS, _result_cells, paired, participant_means
+from signface.study.thesis_tables import RESULT_KINDS, paired, participant_means, result_cells
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -328,12 +328,12 @@ def posthoc_table(responses: Responses) -> StudyTable:
             found = {(first, second): mcnemar(pairs[first], pairs[second]) for first, second in combinations(names, 2)}
             whole = cochran(pairs[names].to_numpy())
             if len(names) > 2:
-                rows.append({"question": name, "pair": "all methods"} | _result_cells(whole, math.nan))
+                rows.append({"question": name, "pair": "all methods"} | result_cells(whole, math.nan))
         else:
             results = dunn([group for _, group in asked])
             found = {(names[i], names[j]): result for (i, j), result in results.items()}
         for ((first, second), result), p in zip(found.items(), holm([result.p for result in found.values()])):
-            rows.append({"question": name, "pair": f"{first} – {second}"} | _result_cells(result, float(p)))
+            rows.append({"question": name, "pair": f"{first} – {second}"} | result_cells(result, float(p)))
     return StudyTable(
         "posthoc",
         "Post-hoc comparisons of pairs",

@@ -18,7 +18,7 @@ from signface.study.rank_tests import kruskal_wallis, spearman
 from signface.study.responses import FACTORS, PERSONAL, Responses
 from signface.study.tables import StudyTable, write_cell, write_p
 from signface.study.test_result import TestResult
-from signface.study.thesis_tables import RESULT_KINDS, _result_cells, right_and_wrong
+from signface.study.thesis_tables import RESULT_KINDS, result_cells, right_and_wrong
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -119,7 +119,7 @@ def influence_details(responses: Responses, results: list[Influence]) -> StudyTa
     corrected = holm([found.result.p for found in results])
     rows = [
         {"question": responses.questions[found.question], "factor": FACTORS[found.factor]}
-        | _result_cells(found.result, float(p))
+        | result_cells(found.result, float(p))
         | {"p over participants": math.nan if found.over_participants is None else found.over_participants.p}
         for found, p in zip(results, corrected)
     ]

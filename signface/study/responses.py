@@ -93,7 +93,7 @@ class Responses:
 
     @property
     def methods(self) -> list[str]:
-        """The methods, in order of first appearance in sorted stimuli (so that row order does not matter)."""
+        """The methods in alphabetical order, so that the order of rows does not matter."""
         return sorted(self.table["method"].unique())
 
     @property

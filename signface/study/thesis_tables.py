@@ -84,7 +84,7 @@ def hypotheses_table(responses: Responses) -> StudyTable:
     results = [test_methods(responses, column) for column in columns]
     corrected = holm([result.p for result in results])
     rows = [
-        {"hypothesis": HYPOTHESES[column][0], "statement": HYPOTHESES[column][1]} | _result_cells(result, p)
+        {"hypothesis": HYPOTHESES[column][0], "statement": HYPOTHESES[column][1]} | result_cells(result, p)
         for column, result, p in zip(columns, results, corrected)
     ]
     return StudyTable(
@@ -97,7 +97,7 @@ def hypotheses_table(responses: Responses) -> StudyTable:
     )
 
 
-#: Kinds of the columns that `_result_cells` fills.
+#: Kinds of the columns that `result_cells` fills.
 RESULT_KINDS: dict[str | tuple[str, str], str] = {
     "statistic": "statistic",
     "df": "count",
@@ -109,7 +109,8 @@ RESULT_KINDS: dict[str | tuple[str, str], str] = {
 }
 
 
-def _result_cells(result: TestResult, corrected: float) -> dict[str, object]:
+def result_cells(result: TestResult, corrected: float) -> dict[str, object]:
+    """The cells that every table of tests has, from a test and its corrected p; their kinds are `RESULT_KINDS`."""
     effect = "–" if math.isnan(result.effect) else f"{result.effect_symbol} = {result.effect:.3f}".replace("-", "−")
     return {
         "test": result.test,
@@ -157,7 +158,7 @@ def pairwise_table(responses: Responses) -> StudyTable:
         results = pairwise_results(responses, column)
         corrected = holm([result.p for result in results.values()])
         for ((first, second), result), p in zip(results.items(), corrected):
-            rows.append({"question": name, "pair": f"{first} – {second}"} | _result_cells(result, float(p)))
+            rows.append({"question": name, "pair": f"{first} – {second}"} | result_cells(result, float(p)))
     return StudyTable(
         "pairwise",
         "Pairs of methods",
