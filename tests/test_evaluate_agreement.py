@@ -51,6 +51,15 @@ def test_moments_without_an_annotation_are_called_nothing():
 
 
 @settings(deadline=None, max_examples=50)
+@given(annotations())
+def test_nobody_annotates_nothing_outside_the_annotations(one):
+    labels = frame_labels([one, one])
+    gaps = one["start_s"].to_numpy()[1:] - one["end_s"].to_numpy()[:-1]
+    if len(one) and (gaps < 1e-9).all():
+        assert NOTHING not in labels
+
+
+@settings(deadline=None, max_examples=50)
 @given(st.lists(st.tuples(st.sampled_from("NAJ"), st.sampled_from("NAJ")), min_size=2, max_size=40))
 def test_cohens_kappa_is_that_of_scikit_learn(pairs):
     first, second = (np.array(side) for side in zip(*pairs))

@@ -42,7 +42,7 @@ def frame_labels(tables: Sequence[pd.DataFrame], *, frame_s: float = FRAME_S) ->
     ends = [table["end_s"].max() for table in tables if len(table)]
     if not starts:
         return np.empty((len(tables), 0), dtype=object)
-    count = max(1, round((max(ends) - min(starts)) / frame_s))
+    count = max(1, int((max(ends) - min(starts)) / frame_s + 1e-9))  # a broken frame at the end is left out
     time = min(starts) + (np.arange(count) + 0.5) * frame_s
     labels = np.full((len(tables), count), NOTHING, dtype=object)
     for row, table in zip(labels, tables):

@@ -47,7 +47,7 @@ def draw_agreement(annotators: Mapping[str, pd.DataFrame], seconds: pd.DataFrame
 
     values = seconds.to_numpy(float)
     totals = values.sum(axis=1, keepdims=True)
-    share = np.divide(values, totals, out=np.zeros_like(values), where=totals > 0)
+    share = np.divide(values, totals, out=np.zeros_like(values), where=totals >= 0.05)
     lower.imshow(share, cmap="Blues", vmin=0, vmax=1, aspect="auto")
     for row, column in np.argwhere(values >= 0.05):
         ink = "white" if share[row, column] > 0.6 else "black"
