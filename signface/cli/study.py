@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from signface.cli import study_analysis
+from signface.cli import study_analysis, study_render
 from signface.errors import SignfaceError
 
 EXAMPLE = """  signface study new group-1 my-study
@@ -32,6 +32,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     new.add_argument("example", metavar="EXAMPLE", help="group-1, group-2a or group-2b, the studies of the thesis")
     new.add_argument("folder", metavar="FOLDER", type=Path, help="where; new or empty")
     new.set_defaults(work=run_new)
+
+    render = step("render", "make films and sheets of stills", study_render.EXAMPLE)
+    study_render.add_render_arguments(render)
+    render.set_defaults(work=study_render.run_render)
 
     serve = step("serve", "put a questionnaire on the web", "  signface study serve my-study --port 8000")
     serve.add_argument("study", metavar="STUDY_FOLDER", type=Path, help="a folder with study.toml and its films")

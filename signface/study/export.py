@@ -63,13 +63,13 @@ def export_table(study: Study, store: Store, *, finished_only: bool = False) -> 
     columns = [*COLUMNS, *(column for column in asked if column not in COLUMNS)]
     table = []
     for (participant, name), values in rows.items():
-        stimulus = stimuli[name]
+        shown = stimuli[name]
         cells = {
             "participant": wanted[participant],
             "stimulus": name,
-            "expression": stimulus.expression,
-            "intensity": str(stimulus.intensity),
-            "method": stimulus.method,
+            "expression": shown.expression,
+            "intensity": str(shown.intensity),
+            "method": shown.method,
             **personal.get(participant, {}),
             **values,
         }

@@ -248,9 +248,9 @@ class Store:
             ).one_or_none()
             if row is None:
                 raise SignfaceError(f"no participant {pseudonym}", hint="signface study export lists them")
-            for table in (answers, self._tables["shown"]):
-                erased = connection.execute(table.delete().where(table.c.participant == row.id)).rowcount
-                count = erased if table is answers else count
+            count = connection.execute(answers.delete().where(answers.c.participant == row.id)).rowcount
+            shown = self._tables["shown"]
+            connection.execute(shown.delete().where(shown.c.participant == row.id))
             connection.execute(participants.delete().where(participants.c.id == row.id))
         if self._engine.dialect.name == "sqlite":
             with self._engine.connect() as connection:  # nothing of it may remain in the log of changes
@@ -388,10 +388,9 @@ class Store:
         """How the study goes: participants, those who finished, answered stimuli, pages answered a minute lately."""
         participants, answers = self._tables["participants"], self._tables["answers"]
         count, distinct = self._sql.func.count, self._sql.distinct
-        pages = self._sql.select(
-            answers.c.participant, answers.c.stimulus, self._sql.func.max(answers.c.answered_at).label("at")
-        ).where(answers.c.stimulus != "")
-        pages = pages.group_by(answers.c.participant, answers.c.stimulus).subquery()
+        last = self._sql.func.max(answers.c.answered_at).label("at")
+        query = self._sql.select(answers.c.participant, answers.c.stimulus, last).where(answers.c.stimulus != "")
+        pages = query.group_by(answers.c.participant, answers.c.stimulus).subquery()
         since = datetime.now(UTC) - timedelta(minutes=minutes)
         with self._engine.connect() as connection:
             started = connection.execute(self._sql.select(count(participants.c.id))).scalar_one()
@@ -402,11 +401,11 @@ class Store:
             lately = connection.execute(
                 self._sql.select(count()).select_from(pages).where(pages.c.at >= since)
             ).scalar_one()
-            query = self._sql.select(
+            each = self._sql.select(
                 participants.c.pseudonym, participants.c.finished_at, count(pages.c.stimulus).label("pages")
             )
             people = connection.execute(
-                query.outerjoin(pages, pages.c.participant == participants.c.id)
+                each.outerjoin(pages, pages.c.participant == participants.c.id)
                 .group_by(participants.c.id, participants.c.pseudonym, participants.c.finished_at)
                 .order_by(participants.c.id)
             ).all()
