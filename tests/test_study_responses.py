@@ -7,7 +7,7 @@ import pytest
 
 from signface.errors import SignfaceError
 from signface.study.analysis import analyse
-from signface.study.responses import order_expressions, read_responses, validate
+from signface.study.responses import combine, order_expressions, read_responses, validate
 from signface.study.simulation import Effects, crossed_design, simulate
 
 FOUR = ("correct", "answer_intensity", "answer_difficulty", "answer_credibility")
@@ -121,6 +121,25 @@ def test_a_participant_has_one_age():
     table = answers()
     table.loc[7, "age"] += 1
     assert "more than one age" in refusal(table)
+
+
+def test_two_groups_make_one_study_of_different_people():
+    first = validate(answers(), name="2a.csv")
+    second = validate(
+        simulate(crossed_design("b", ["A", "B"], ["answer_fidelity"], 6), seed=4).drop(columns="simulated"),
+        name="2b.csv",
+    )
+    both = combine([first, second])
+    assert len(both.participants) == 12
+    assert list(both.questions.values()) == ["accuracy", "intensity", "ease", "credibility", "fidelity"]
+    alone, together = analyse(first, resamples=100), analyse(both, resamples=100)
+    for key in ("hypotheses", "pairwise"):
+        one, two = alone.table(key), together.table(key)
+        assert one is not None
+        assert two is not None
+        assert two.frame["p"].iloc[: len(one.frame)].tolist() == pytest.approx(one.frame["p"].tolist())
+        assert len(two.frame) == len(one.frame) + 1
+    assert combine([first]) is first
 
 
 def test_what_weakens_a_study_is_a_warning():

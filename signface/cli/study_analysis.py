@@ -15,7 +15,12 @@ SIMULATE_EXAMPLE = "  signface study simulate group-1 -o responses.csv --effect 
 
 def add_analyse_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of `analyse`."""
-    parser.add_argument("responses", metavar="RESPONSES.csv", help="answers of a study, one row per answer")
+    parser.add_argument(
+        "responses",
+        metavar="RESPONSES.csv",
+        nargs="+",
+        help="answers, one row per answer; several groups make one study",
+    )
     parser.add_argument(
         "-o", "--output", metavar="FOLDER", help="where to write (default: RESPONSES-analysis beside it)"
     )
@@ -30,16 +35,16 @@ def run_analyse(arguments: argparse.Namespace) -> int:
     """Print the tables; write the report and the tables as CSV and LaTeX."""
     from signface.report.study_report import write_report
     from signface.study.analysis import analyse
-    from signface.study.responses import read_responses
+    from signface.study.responses import combine, read_responses
     from signface.study.tables import as_text
 
     if not 0 < arguments.alpha < 1:
         raise SignfaceError(f"--alpha {arguments.alpha:g} is no significance level", hint="choose one between 0 and 1")
     if arguments.resamples < 100:
         raise SignfaceError(f"--resamples {arguments.resamples} is too few", hint="ask for at least 100")
-    source = Path(arguments.responses)
+    source = Path(arguments.responses[0])
     folder = Path(arguments.output) if arguments.output else source.with_name(f"{source.stem}-analysis")
-    responses = read_responses(source)
+    responses = combine([read_responses(file) for file in arguments.responses])
     for warning in responses.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     analysis = analyse(responses, alpha=arguments.alpha, resamples=arguments.resamples, seed=arguments.seed)

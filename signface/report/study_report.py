@@ -159,7 +159,7 @@ def report_html(
             simulated=responses.simulated,
             source=Path(responses.name).name,
             facts=_facts(analysis),
-            warnings=[warning for warning in responses.warnings if not warning.startswith("SIMULATED")],
+            warnings=[warning for warning in responses.warnings if "SIMULATED ANSWERS" not in warning],
             findings=analysis.findings,
             sections=[_section(section, drawn.get(section.key, []), analysis) for section in analysis.sections],
             screenshots=_pictures(screenshots),

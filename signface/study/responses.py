@@ -1,6 +1,7 @@
 """The answers of a perceptual study: one row per answer, read once and validated.
 
 - `read_responses`: read the csv; everything that must be mended is said in one error, the rest becomes a warning.
+- `combine`: several groups of participants as one study.
 - `Responses`: the table with the derived column `correct`, its questions, methods, participants and warnings.
 - `QUESTIONS`, `FACTORS`: the columns that answer something and those that may explain it.
 
@@ -13,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from signface.errors import SignfaceError
@@ -177,6 +179,34 @@ def read_responses(path: str | PathLike[str]) -> Responses:
             raise SignfaceError("is no table", file=path, hint="save it as csv with a header") from error
         raise
     return validate(raw, name=str(path))
+
+
+def combine(studies: Sequence[Responses]) -> Responses:
+    """The answers of several groups as one study: groups 2a and 2b of the thesis make tables 6.8 and 6.9 together.
+
+    Parameters
+    ----------
+    studies : sequence of Responses
+        Participants of different studies are different people, whatever their pseudonyms.
+
+    Returns
+    -------
+    Responses
+        Simulated if any part is; each warning names its study. One study comes back as it is.
+    """
+    import pandas as pd
+
+    if len(studies) == 1:
+        return studies[0]
+    names = [Path(study.name).name for study in studies]
+    if len(set(names)) < len(names):
+        names = [f"{name} ({place})" for place, name in enumerate(names, start=1)]
+    tables = [
+        study.table.assign(participant=f"{name}: " + study.table["participant"]) for name, study in zip(names, studies)
+    ]
+    warnings = [f"{name}: {warning}" for name, study in zip(names, studies) for warning in study.warnings]
+    simulated = any(study.simulated for study in studies)
+    return Responses(pd.concat(tables, ignore_index=True), tuple(warnings), simulated, " + ".join(names))
 
 
 def validate(raw: pd.DataFrame, *, name: str = "responses") -> Responses:
