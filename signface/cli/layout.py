@@ -7,18 +7,19 @@ from pathlib import Path
 
 import numpy as np
 
+from signface.cli import layout_study
 from signface.errors import SignfaceError
 
 EXAMPLE = (
     "  signface layout show --layout default-40 -o layout.png\n"
     "  signface layout check --layout mine.csv\n"
-    "  signface layout suggest take.c3d -o layout.csv --neutral 2.5"
+    "  signface layout suggest take.c3d -o layout.csv --neutral 2.5\n" + layout_study.EXAMPLE
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `signface layout`."""
-    actions = parser.add_subparsers(dest="action", metavar="show|check|suggest", required=True)
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     show = actions.add_parser("show", help="draw the markers on the face, from the front and both sides")
     check = actions.add_parser("check", help="read a layout and say which bases its markers cannot tell")
     for own in (show, check):
@@ -37,11 +38,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     suggest.add_argument(
         "-o", "--output", type=Path, default=Path("layout.csv"), help="the layout (default: %(default)s)"
     )
+    layout_study.add_actions(actions)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Do what was asked; 0 when done."""
-    {"show": _show, "check": _check, "suggest": _suggest}[arguments.action](arguments)
+    own = {"show": _show, "check": _check, "suggest": _suggest}
+    own.get(arguments.action, layout_study.run_action)(arguments)
     return 0
 
 

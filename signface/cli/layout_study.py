@@ -1,0 +1,199 @@
+"""`signface layout place|optimise|study`: which markers, how many, where."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from signface.errors import SignfaceError
+
+if TYPE_CHECKING:
+    from signface.face.model import FaceModel
+    from signface.placement.sites import Rules
+
+EXAMPLE = (
+    "  signface layout place signcom-41 -o signcom.csv\n"
+    "  signface layout optimise --markers 40 --method greedy -o mine.csv\n"
+    "  signface layout study -o layout-study"
+)
+
+
+def add_actions(actions: argparse._SubParsersAction) -> None:
+    """Add the three actions to those of `signface layout`."""
+    place = actions.add_parser("place", help="an empirical layout, placed on a face by anatomical landmarks")
+    place.add_argument("name", metavar="NAME", help="mpeg4-53, face-robot-35, signcom-41, sign3d-60, man-62 ... man-15")
+    place.add_argument("--face", default="default", help="a shipped face or a file (default: %(default)s)")
+    place.add_argument("-o", "--output", type=Path, default=Path("layout.csv"), help="(default: %(default)s)")
+
+    optimise = actions.add_parser("optimise", help="choose where so many markers tell most")
+    optimise.add_argument("--markers", type=int, default=40, metavar="N", help="face markers (default: %(default)s)")
+    optimise.add_argument(
+        "--method",
+        default="greedy",
+        help="k-means, greedy, a-optimal, d-optimal or thin-shell (default: %(default)s)",
+    )
+    optimise.add_argument("--actors", type=int, default=4, metavar="N", help="synthetic actors (default: %(default)s)")
+    optimise.add_argument(
+        "-o", "--output", type=Path, default=Path("layout.csv"), help="the layout; its sheet comes beside it"
+    )
+
+    study = actions.add_parser("study", help="compare layouts: how many markers, where, with a report")
+    study.add_argument("-o", "--output", type=Path, default=Path("layout-study"), help="folder (default: %(default)s)")
+    study.add_argument("--actors", type=int, default=4, metavar="N", help="synthetic actors (default: %(default)s)")
+    study.add_argument(
+        "--selection", type=int, default=2, metavar="N", help="of them, choose markers on so many (default: 2)"
+    )
+    study.add_argument("--sizes", default="15,30,40,60", metavar="N,N,...", help="markers (default: %(default)s)")
+    study.add_argument("--methods", default="all", metavar="NAME,...", help="methods of choice (default: all)")
+    study.add_argument(
+        "--layouts", default="all", metavar="NAME,...", help="empirical or shipped layouts or files (default: all)"
+    )
+    study.add_argument("--draws", type=int, default=2, metavar="N", help="draws of placement errors (default: 2)")
+    study.add_argument("--recommended", type=int, default=40, metavar="N", help="size of the recommended layout")
+    study.add_argument("--jobs", type=int, default=0, metavar="N", help="processes (default: one for each core)")
+    for own in (optimise, study):
+        own.add_argument("--seconds", type=float, default=90.0, help="of each motion of an actor (default: 90)")
+        own.add_argument("--seed", type=int, default=0, help="(default: %(default)s)")
+        own.add_argument("--asymmetric", action="store_true", help="do not pair markers left and right")
+        own.add_argument(
+            "--forbid",
+            action="append",
+            metavar="ZONE|CSV",
+            help="where no marker may stand: lids, lips-inner, nostrils, under-jaw, none, or a csv of x,y,z,radius_mm;"
+            " may be repeated (default: the four zones)",
+        )
+        own.add_argument("--apart", type=float, default=8.0, metavar="MM", help="least distance (default: 8)")
+        own.add_argument("--keep", type=Path, metavar="LAYOUT.csv", help="markers that stay, on the nearest vertices")
+
+
+def run_action(arguments: argparse.Namespace) -> None:
+    """Do the action that was asked for."""
+    {"place": _place, "optimise": _optimise, "study": _study}[arguments.action](arguments)
+
+
+def _place(arguments: argparse.Namespace) -> None:
+    from signface.face.layout_files import write_layout
+    from signface.face.reading import read_face
+    from signface.placement.empirical import EMPIRICAL, place_layout
+
+    face = read_face(arguments.face)
+    layout = place_layout(arguments.name, face)
+    write_layout(layout, arguments.output, face)
+    print(f"{arguments.output}: {EMPIRICAL[arguments.name]}")
+    print(f"look at it: signface layout show --layout {arguments.output}")
+
+
+def _rules(arguments: argparse.Namespace, face: FaceModel) -> Rules:
+    """The captor's rules from the command line."""
+    import numpy as np
+    import pandas as pd
+
+    from signface.face.layout_files import read_layout
+    from signface.placement.sites import ZONES, Rules
+
+    zones: list[str] = []
+    spheres = []
+    for word in arguments.forbid or list(ZONES):
+        if word.endswith(".csv"):
+            try:
+                table = pd.read_csv(word)
+                rows = table[["x", "y", "z", "radius_mm"]].to_numpy(float)
+            except (OSError, KeyError, ValueError) as error:
+                raise SignfaceError(
+                    "is no table of forbidden places", file=word, hint="its columns are x, y, z, radius_mm"
+                ) from error
+            spheres += [(row[:3], float(row[3])) for row in rows]
+        elif word != "none":
+            zones.append(word)
+    fixed: tuple[int, ...] = ()
+    if arguments.keep is not None:
+        points = read_layout(arguments.keep, face).points(face)
+        apart = np.linalg.norm(face.mesh.vertices[None] - points[:, None], axis=2)
+        fixed = tuple(dict.fromkeys(int(vertex) for vertex in apart.argmin(axis=1)))
+    return Rules(not arguments.asymmetric, tuple(zones), tuple(spheres), arguments.apart, fixed)
+
+
+def _warn(face: FaceModel, actors: list) -> None:
+    """Say which expressions the layouts will not see."""
+    from signface.placement.choosing import unseen_bases
+
+    never, _ = unseen_bases(face, actors)
+    if never:
+        print(f"warning: the range of motion never shows {', '.join(never)}: layouts chosen from it may not see them")
+
+
+def _optimise(arguments: argparse.Namespace) -> None:
+    from signface.face.layout_files import write_layout
+    from signface.face.reading import read_face
+    from signface.placement.actors import draw_actors
+    from signface.placement.choosing import Material, choose
+
+    face = read_face("default")
+    rules = _rules(arguments, face)
+    actors = draw_actors(face, arguments.actors, seconds=arguments.seconds, seed=arguments.seed)
+    _warn(face, actors)
+    layout = choose(Material(face, actors, rules), arguments.method, arguments.markers, seed=arguments.seed)
+    write_layout(layout, arguments.output, face)
+    print(f"{arguments.output}: {len(layout.face_labels)} face markers, {len(layout.head_labels)} head markers")
+
+
+def _study(arguments: argparse.Namespace) -> None:
+    import os
+
+    from joblib import Parallel, delayed
+
+    from signface.cli.progress import progress
+    from signface.face.reading import read_face
+    from signface.files import whole_file
+    from signface.placement import layout_study
+    from signface.placement.actors import draw_actors
+    from signface.placement.choosing import METHODS
+
+    face = read_face("default")
+    rules = _rules(arguments, face)
+    plan = layout_study.Plan(
+        actors=arguments.actors,
+        selection=arguments.selection,
+        seconds=arguments.seconds,
+        sizes=_numbers(arguments.sizes),
+        methods=tuple(METHODS) if arguments.methods == "all" else tuple(arguments.methods.split(",")),
+        empirical=layout_study.Plan.empirical if arguments.layouts == "all" else tuple(arguments.layouts.split(",")),
+        draws=arguments.draws,
+        recommended=arguments.recommended,
+        seed=arguments.seed,
+    )
+    actors = draw_actors(face, plan.actors, seconds=plan.seconds, seed=plan.seed)
+    _warn(face, actors[: plan.selection])
+    entries = layout_study.make_layouts(plan, face, actors, rules)
+    tested = [actor.name for actor in actors[plan.selection :]]
+    work = [(entry, condition, draw) for entry in entries for condition, draw in layout_study.conditions(plan)]
+    folder = Path(arguments.output) / "cells"
+    files = [folder / f"{layout_study.cell_key(plan, *own, tested)}.npz" for own in work]
+    left = [k for k, file in enumerate(files) if layout_study.load_cell(file) is None]
+    if len(left) < len(work):
+        print(f"{len(work) - len(left)} of {len(work)} cells were done before")
+    jobs = arguments.jobs or os.cpu_count() or 1
+    runs = Parallel(n_jobs=min(jobs, max(1, len(left))), return_as="generator")(
+        delayed(layout_study.run_cell)(face, work[k][0], actors, tested, work[k][1], work[k][2]) for k in left
+    )
+    for k, errors in zip(left, progress(runs, "studying", total=len(left))):
+        layout_study.save_cell(errors, files[k])
+    cells = []
+    for (entry, condition, draw), file in zip(work, files):
+        errors = layout_study.load_cell(file)
+        if errors is None:
+            raise SignfaceError("cannot be read back", file=file, hint="is the disk full? run the study again")
+        cells.append(layout_study.Cell(entry.layout.name, entry.family, len(entry.layout.face_labels), condition, draw,
+                                       tuple(errors)))  # fmt: skip
+    table = layout_study.collect(cells, int(face.moving.sum()))
+    with whole_file(Path(arguments.output) / "errors.csv") as temporary:
+        table.to_csv(temporary, index=False, float_format="%.5f")
+    print(layout_study.summarise(table).to_string(index=False, float_format="%.3f"))
+
+
+def _numbers(word: str) -> tuple[int, ...]:
+    try:
+        return tuple(int(part) for part in word.split(","))
+    except ValueError:
+        raise SignfaceError(f"{word!r} is no list of numbers", hint="write --sizes 15,30,40") from None
