@@ -96,6 +96,23 @@ def test_learning_shows_the_corrections_and_does_better_on_takes_held_out(corpus
     assert set(load_model(out).card.labels) == {"N", "J", "A"}
 
 
+def test_learning_says_so_when_it_makes_things_worse(tmp_path, capsys):
+    """Takes of which none shows the other's expression teach nothing about each other."""
+    folder = tmp_path / "two"
+    for name, words in (("joy", "N J N"), ("anger", "N A N")):
+        descriptors, truth = acted(words)
+        write_weights(descriptors, folder / f"{name}.csv")
+        write_eaf(folder / f"{name}.eaf", truth, signer="S1")
+    rows = "".join(f"{name}.csv,S1,EU,{name}.eaf\n" for name in ("joy", "anger"))
+    (folder / "takes.csv").write_text("take,signer,kind,annotation\n" + rows)
+    descriptors, truth = acted("N J N A N", seed=9)
+    good = train_model([Example("old", "S9", "IE", descriptors, truth)], classifier="knn1", name="good")
+    save_model(good, tmp_path / "good.skops")
+    arguments = ["--before", str(tmp_path / "good.skops"), "--classifier", "knn1"]
+    assert main(["elan", "learn", str(folder), "-o", str(tmp_path / "mine.skops"), *arguments]) == 0
+    assert "the new classifier does worse: stay with good" in capsys.readouterr().out
+
+
 def test_learning_without_a_model_to_write_only_shows_the_corrections(corpus, capsys):
     assert main(["elan", "learn", str(corpus)]) == 0
     assert "9 of 27" in capsys.readouterr().out

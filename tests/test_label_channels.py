@@ -68,6 +68,11 @@ def test_brows_raised_and_lowered_together_are_their_own_value():
     ]
 
 
+def test_values_that_do_not_begin_and_end_together_leave_no_slivers():
+    both = BROWS_UP | {"browDownLeft": [(0.97, 2.03, 0.8)], "browDownRight": [(0.97, 2.03, 0.8)]}
+    assert events(moving(**both), "brows") == [(0.97, 2.03, "raised and lowered")]
+
+
 def test_a_flicker_is_no_event():
     assert events(moving(jawOpen=[(1.0, 1.05, 0.9)]), "mouth") == []
 

@@ -189,6 +189,8 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
         labels = held_out_labels(corrected, before, others=others, classifier=arguments.classifier, seed=arguments.seed)
         print(_before_and_after(labels, before.name))
         scores = {"accuracy on corrected takes held out": float((labels["after"] == labels["label"]).mean())}
+        if (labels["after"] == labels["label"]).mean() < (labels["before"] == labels["label"]).mean():
+            print(f"the new classifier does worse: stay with {before.name}, or learn from more takes (--with)")
         known = {example.take for example in corrected} & set(before.card.takes)
         if known:
             print(f"{before.name} was trained on {len(known)} of these takes: its accuracy flatters it")

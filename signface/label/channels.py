@@ -221,6 +221,8 @@ def _runs(label: np.ndarray, shortest: float) -> Iterator[tuple[int, int, int]]:
         follows = merged and merged[-1][1] == start and merged[-1][2] >= 0
         if follows and (merged[-1][2] == code or (code >= 0 and end - start < shortest)):
             merged[-1][1] = end
+        elif follows and code >= 0 and merged[-1][1] - merged[-1][0] < shortest:
+            merged[-1][1:] = [end, code]  # a fragment with nothing before it
         else:
             merged.append([start, end, code])
     yield from ((start, end, code) for start, end, code in merged if code >= 0)
