@@ -9,6 +9,7 @@ The steps themselves live in their rooms; this module only puts them in a row.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -124,6 +125,8 @@ def write_annotation(
     *,
     signer: str = "",
     video: str | PathLike[str] | None = None,
+    date: str | None = None,
+    properties: Mapping[str, str] | None = None,
     replace: bool = False,
 ) -> list[Path]:
     """Write `TAKE.eaf`, its curves and their description for ELAN's timeseries viewer.
@@ -137,6 +140,10 @@ def write_annotation(
         Names the tiers (`affect@SIGNER`); empty for a tier `affect`.
     video : path, optional
         Film of the take, linked as the EAF's media.
+    date : str, optional
+        The files' date (ISO 8601); now when not given. With a date, the same input gives the same bytes.
+    properties : mapping, optional
+        What the header of the `.eaf` says besides model, take and residual.
     replace : bool
         Overwrite an `.eaf` in which somebody has worked; the old one is kept as a backup.
 
@@ -158,9 +165,9 @@ def write_annotation(
     descriptors, segments = annotation.descriptors, annotation.segments
     check_writable(file, replace=replace)  # before the curves: nothing half written
     write_curves(descriptors, segments, curves)
-    write_tsconf(curves, tsconf)
+    write_tsconf(curves, tsconf, date=date)
     residual = median_residual(descriptors)
-    properties = {
+    told = {
         "model": annotation.classifier,
         "take": descriptors.name,
         "residual_mm": "unknown" if residual is None else f"{residual:.2f}",
@@ -170,8 +177,9 @@ def write_annotation(
         segments,
         signer=signer,
         video=video,
-        properties=properties,
+        properties={**told, **(properties or {})},
         linked_files=(curves, tsconf),
+        date=date,
         replace=replace,
     )
     return [file, curves, tsconf]

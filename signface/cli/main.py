@@ -22,6 +22,7 @@ COMMANDS = {
     "segment": "cut weights or a recording into stable segments and transitions",
     "train": "train a classifier on a corpus",
     "evaluate": "measure segmentation and classifiers on a corpus",
+    "corpus": "check, solve and annotate a whole corpus; open its descriptors",
     "face": "look at, check, convert and list faces",
     "layout": "show, check and suggest marker layouts",
     "synth": "make a synthetic corpus",

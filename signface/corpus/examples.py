@@ -6,10 +6,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from pathlib import Path
 
+from signface.corpus.describing import recipe_of, stored_or_solved
 from signface.corpus.manifest import Corpus, TakeEntry
-from signface.descriptors import Descriptors
+from signface.corpus.origin import Origin, Recipe, find_origin, make_recipe
+from signface.corpus.store import DescriptorStore, open_store
 from signface.errors import SignfaceError
 from signface.label.training import Example
 
@@ -26,7 +27,9 @@ def solve_examples(
     workers: int = WORKERS,
     progress: Callable[[Iterable[Example]], Iterable[Example]] = iter,
 ) -> list[Example]:
-    """Solve the annotated takes of a corpus, several at a time, and read their reference annotations.
+    """Descriptors of the annotated takes of a corpus, with their reference annotations.
+
+    What the store of the corpus has is taken from there; the rest is solved, several takes at a time, and put there.
 
     Parameters
     ----------
@@ -50,10 +53,8 @@ def solve_examples(
     Raises
     ------
     SignfaceError
-        No take is annotated, or a recording or annotation cannot be used.
+        No take is annotated, a recording or annotation cannot be used, or the store was written by a newer signface.
     """
-    from joblib import Parallel, delayed
-
     entries = [entry for entry in corpus if entry.annotation is not None]
     if not entries:
         raise SignfaceError(
@@ -61,50 +62,34 @@ def solve_examples(
             file=corpus.folder,
             hint="fill in the column annotation of takes.csv",
         )
-    jobs = (delayed(solve_example)(entry, corpus.folder, face, layout, alpha) for entry in entries)
-    solved: Iterator[Example] = Parallel(n_jobs=min(workers, len(entries)), return_as="generator")(jobs)
-    return list(progress(solved))
+    store = open_store(corpus.folder)
+    recipe = make_recipe(face, layout, alpha=alpha)
+    known: dict[tuple[str, str | None], Recipe] = {}
+    origins = [find_origin(entry, corpus.folder, recipe_of(entry, recipe, known)) for entry in entries]
+    return list(progress(_examples(entries, origins, store, workers)))
 
 
-def solve_example(
-    entry: TakeEntry, folder: Path, face: str = "default", layout: str | None = None, alpha: float | None = None
-) -> Example:
-    """Solve one annotated take of a corpus; see `solve_examples`. Weights (from a phone, or solved before) are kept.
+def _examples(
+    entries: list[TakeEntry], origins: list[Origin], store: DescriptorStore | None, workers: int
+) -> Iterator[Example]:
+    """The examples in order: those of the store at once, the others as they are solved."""
+    from joblib import Parallel, delayed
 
-    `start_s` of the row, the time of the first frame in the video, places the take on the time line of its
-    annotation; `neutral_s` is on that time line too.
-    """
-    from signface.annotation import describe
     from signface.elan.reference import read_reference
-    from signface.takes.reading import read_recording
 
-    if entry.annotation is None:
-        raise SignfaceError("has no reference annotation", file=entry.path)
-    recording = read_recording(entry.path)
-    if entry.start_s is not None:
-        recording = recording.changed(f"start at {entry.start_s:g} s", start=entry.start_s)
-    if isinstance(recording, Descriptors):
-        descriptors = recording
-    else:
-        from signface.face.layout_files import read_layout
-        from signface.face.reading import read_face
-
-        own_face = read_face(entry.face or face)
-        own_layout = entry.layout or layout
-        try:
-            descriptors = describe(
-                recording,
-                face=own_face,
-                layout=None if own_layout is None else read_layout(own_layout, own_face),
-                neutral="auto" if entry.neutral_s is None else entry.neutral_s,
-                alpha=alpha,
-            )
-        except SignfaceError as error:
-            raise error if error.file else SignfaceError(error.problem, file=entry.path, hint=error.hint) from error
-    return Example(
-        take=entry.path.relative_to(folder).with_suffix("").as_posix(),
-        signer=entry.signer,
-        kind=entry.kind,
-        descriptors=descriptors,
-        reference=read_reference(entry.annotation, entry.signer),
-    )
+    found = [None if store is None else store.read(origin) for origin in origins]
+    missing = [(e, o) for e, o, descriptors in zip(entries, origins, found, strict=True) if descriptors is None]
+    jobs = (delayed(stored_or_solved)(entry, origin, store) for entry, origin in missing)
+    solved = iter(())
+    if missing:
+        solved = Parallel(n_jobs=min(workers, len(missing)), return_as="generator")(jobs)
+    for entry, origin, stored in zip(entries, origins, found, strict=True):
+        descriptors = next(solved)[0] if stored is None else stored
+        assert entry.annotation is not None
+        yield Example(
+            take=origin.take,
+            signer=entry.signer,
+            kind=entry.kind,
+            descriptors=descriptors,
+            reference=read_reference(entry.annotation, entry.signer),
+        )

@@ -1,0 +1,170 @@
+"""`signface corpus`: check a corpus, solve and annotate all of it, look into its descriptors."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from signface.cli.options import add_face_arguments
+from signface.cli.progress import progress
+from signface.errors import SignfaceError
+
+EXAMPLE = """  signface corpus check corpora/feel
+  signface corpus run corpora/feel
+  signface corpus run corpora/feel --scheduler tcp://10.0.0.1:8786
+  signface corpus info corpora/feel
+  signface corpus query corpora/feel "SELECT signer, avg(jawOpen) FROM descriptors GROUP BY signer" """
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Fill the parser of this command."""
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+
+    check = actions.add_parser("check", help="find every problem of a corpus at once")
+    _add_corpus(check)
+    _add_workers(check)
+    add_face_arguments(check)
+
+    run_ = actions.add_parser("run", help="solve and annotate every take; goes on where it was stopped")
+    _add_corpus(run_)
+    run_.add_argument(
+        "-o", "--output", type=Path, metavar="FOLDER", help="for the .eaf files and logs (default: CORPUS/annotated)"
+    )
+    _add_workers(run_)
+    run_.add_argument(
+        "--scheduler", metavar="ADDRESS", help="run on a Dask cluster that sees the same files (tcp://HOST:8786)"
+    )
+    add_face_arguments(run_)
+    run_.add_argument("--method", default="thin-shell", help="how weights are solved (default: %(default)s)")
+    run_.add_argument("--alpha", type=float, metavar="A", help="weight of the thin shell, 0 to 1")
+    run_.add_argument(
+        "--classifier", default="default", metavar="NAME_OR_FILE", help="a shipped classifier or a .skops file"
+    )
+
+    info = actions.add_parser("info", help="what is in a corpus and in its store, and how to open it")
+    _add_corpus(info)
+
+    query = actions.add_parser("query", help="ask the stored descriptors with SQL; csv on standard output")
+    _add_corpus(query)
+    query.add_argument("sql", metavar="SQL", help="the table is called descriptors")
+    query.add_argument("--recipe", metavar="NAME", help="which descriptors, where there are several (corpus info)")
+
+
+def _add_corpus(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("corpus", type=Path, metavar="CORPUS", help="folder of a corpus")
+
+
+def _add_workers(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--workers", type=_count, metavar="N", help="takes at a time (default: one for each core)")
+
+
+def _count(text: str) -> int:
+    """A number from 1; for argparse."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes")
+    return int(text)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Do what was asked for."""
+    return {"check": check, "run": run_all, "info": info, "query": query}[arguments.action](arguments)
+
+
+def check(arguments: argparse.Namespace) -> int:
+    """Print every problem on a line of its own."""
+    from signface.corpus.checking import check_corpus
+
+    found = check_corpus(
+        arguments.corpus,
+        face=arguments.face,
+        layout=arguments.layout,
+        workers=arguments.workers,
+        progress=lambda items, total: progress(items, "checking", total=total),
+    )
+    for problem in found.problems:
+        print(f"signface: {problem}", file=sys.stderr)
+    count = len(found.problems)
+    print(f"{found.summary}: {'no problem' if not count else '1 problem' if count == 1 else f'{count} problems'}")
+    return 2 if count else 0
+
+
+def run_all(arguments: argparse.Namespace) -> int:
+    """Run, show how far it is, and say at the end what became of the takes."""
+    from signface.corpus.manifest import read_corpus
+    from signface.corpus.running import ANNOTATED, BEFORE, CORRECTED, DONE, FAILED, LOGS, run_corpus
+
+    corpus = read_corpus(arguments.corpus)
+    output = arguments.output or corpus.folder / ANNOTATED
+    outcomes = run_corpus(
+        corpus,
+        output=output,
+        face=arguments.face,
+        layout=arguments.layout,
+        method=arguments.method,
+        alpha=arguments.alpha,
+        classifier=arguments.classifier,
+        workers=arguments.workers,
+        scheduler=arguments.scheduler,
+    )
+    count = dict.fromkeys((DONE, BEFORE, CORRECTED, FAILED), 0)
+    solved = 0
+    wrong, kept = [], []
+    for outcome in progress(outcomes, "annotating", total=len(corpus)):
+        count[outcome.state] += 1
+        solved += outcome.solved
+        if outcome.state == FAILED:
+            wrong.append(outcome)
+        elif outcome.state == CORRECTED:
+            kept.append(outcome)
+    print(
+        f"{len(corpus)} takes: {count[DONE]} annotated ({solved} solved), {count[BEFORE]} done before, "
+        f"{count[CORRECTED]} corrected by hand and left alone, {count[FAILED]} failed"
+    )
+    print(f"annotations: {output}\nlogs: {output / LOGS}")
+    for outcome in sorted(kept, key=lambda outcome: outcome.take):
+        print(outcome.message)
+    for outcome in sorted(wrong, key=lambda outcome: outcome.take):
+        print(f"signface: {outcome.message}", file=sys.stderr)
+    return 2 if wrong else 0
+
+
+def info(arguments: argparse.Namespace) -> int:
+    """Print takes by signer and kind, and each recipe of the store with the line that opens it."""
+    from collections import Counter
+
+    from signface.corpus.manifest import read_corpus
+    from signface.corpus.origin import SOLVING_CODE, code_digest
+    from signface.corpus.store import DescriptorStore, read_provenance, stored_files
+
+    corpus = read_corpus(arguments.corpus)
+    print(f"{corpus.folder}: {len(corpus)} takes, {sum(take.annotation is not None for take in corpus)} annotated")
+    for (signer, kind), number in sorted(Counter((take.signer, take.kind) for take in corpus).items()):
+        print(f"  {signer} {kind}: {number}")
+    store = DescriptorStore(corpus.folder)
+    if not store.recipes():
+        print("no descriptors are stored yet: signface corpus run, train and evaluate store what they solve")
+    for recipe in store.recipes():
+        files = list(stored_files(recipe))
+        size = sum(file.stat().st_size for file in files) / 1e6
+        current = bool(files) and (
+            read_provenance(files[0])["origin"]["recipe"]["solver"] == code_digest(*SOLVING_CODE)
+        )
+        note = "" if current else ", of another version of signface: it may be deleted"
+        print(f"{recipe}: {len(files)} takes, {size:.1f} MB{note}")
+        print(f'  pandas: pandas.read_parquet("{recipe}")')
+        print(f"  DuckDB: duckdb.sql(\"FROM '{recipe}/**/*.parquet'\")")
+    return 0
+
+
+def query(arguments: argparse.Namespace) -> int:
+    """Print the answer of a query as csv."""
+    from signface.corpus.manifest import read_corpus
+    from signface.corpus.store import DescriptorStore
+
+    if not arguments.sql.strip():
+        raise SignfaceError("the query is empty")
+    folder = read_corpus(arguments.corpus).folder
+    answer = DescriptorStore(folder).query(arguments.sql, arguments.recipe)
+    answer.to_csv(sys.stdout, index=False)
+    return 0

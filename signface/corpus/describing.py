@@ -1,0 +1,119 @@
+"""One take of a corpus to its descriptors, from the store where it has them.
+
+- `describe_entry`: solve a row of `takes.csv`.
+- `stored_or_solved`: the same, but only when the store does not have it.
+- `read_entry`, `recipe_of`, `layout_for`: the recording, recipe and layout of a row.
+
+Faces and layouts are read once in a process and used for as many takes as there are.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from signface.corpus.manifest import TakeEntry
+from signface.corpus.origin import Origin, Recipe, content_digest, make_recipe
+from signface.corpus.store import DescriptorStore
+from signface.descriptors import Descriptors
+from signface.errors import SignfaceError
+from signface.files import shipped
+
+if TYPE_CHECKING:
+    from signface.face.layout import MarkerLayout
+    from signface.face.model import FaceModel
+    from signface.takes.take import Take
+
+
+def describe_entry(entry: TakeEntry, recipe: Recipe) -> Descriptors:
+    """Solve one take of a corpus. Weights (from a phone, or solved before) are kept.
+
+    `start_s` of the row, the time of the first frame in the video, places the take on the time line of its
+    annotation; `neutral_s` is on that time line too.
+
+    Raises
+    ------
+    SignfaceError
+        The recording cannot be read or solved; the message names it.
+    """
+    from signface.annotation import describe
+
+    recording = read_entry(entry)
+    if isinstance(recording, Descriptors):
+        return recording
+    try:
+        face = _face(recipe.face, recipe.face_digest)
+        return describe(
+            recording,
+            face=face,
+            layout=layout_for(recipe, recording.labels),
+            neutral="auto" if entry.neutral_s is None else entry.neutral_s,
+            method=recipe.method,
+            alpha=recipe.alpha,
+        )
+    except SignfaceError as error:
+        raise error if error.file else SignfaceError(error.problem, file=entry.path, hint=error.hint) from error
+
+
+def read_entry(entry: TakeEntry) -> Take | Descriptors:
+    """The recording of a row of `takes.csv`, on the time line of its annotation."""
+    from signface.takes.reading import read_recording
+
+    recording = read_recording(entry.path)
+    if entry.start_s is None:
+        return recording
+    return recording.changed(f"start at {entry.start_s:g} s", start=entry.start_s)
+
+
+def stored_or_solved(entry: TakeEntry, origin: Origin, store: DescriptorStore | None) -> tuple[Descriptors, bool]:
+    """Descriptors of a take, and whether they had to be solved; what was solved is put in the store.
+
+    Raises
+    ------
+    SignfaceError
+        As `describe_entry`; or the store was written by a newer signface, or cannot be written.
+    """
+    found = None if store is None else store.read(origin)
+    if found is not None:
+        return found, False
+    descriptors = describe_entry(entry, origin.recipe)
+    if store is not None:
+        store.write(origin, descriptors)
+    return descriptors, True
+
+
+def recipe_of(entry: TakeEntry, recipe: Recipe, known: dict[tuple[str, str | None], Recipe]) -> Recipe:
+    """The recipe of a take: its row may name another face or layout. `known` keeps those that were made.
+
+    Raises
+    ------
+    SignfaceError
+        There is no such face or layout.
+    """
+    if entry.face is None and entry.layout is None:
+        return recipe
+    names = (entry.face or recipe.face, entry.layout or recipe.layout)
+    if names not in known:
+        known[names] = make_recipe(*names, method=recipe.method, alpha=recipe.alpha)
+    return known[names]
+
+
+@lru_cache(maxsize=4)
+def _face(name: str, digest: str) -> FaceModel:
+    """A face whose content is the one that was asked for."""
+    from signface.face.reading import read_face
+
+    path = shipped("faces", ".glb").get(name, Path(name))
+    if content_digest(path) != digest:
+        raise SignfaceError("is not the face that the run began with", file=path, hint="run again")
+    return read_face(name)
+
+
+@lru_cache(maxsize=16)
+def layout_for(recipe: Recipe, labels: tuple[str, ...]) -> MarkerLayout:
+    """The layout of a recipe, or the shipped one that fits the labels of a take best."""
+    from signface.face.layout_files import choose_layout, read_layout
+
+    face = _face(recipe.face, recipe.face_digest)
+    return choose_layout(labels, face) if recipe.layout is None else read_layout(recipe.layout, face)

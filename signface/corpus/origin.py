@@ -1,0 +1,215 @@
+"""What descriptors come from: everything that would change them, and the key that stands for it.
+
+- `Recipe`: how a corpus is solved; face, layout, method, alpha, and the solver itself.
+- `Origin`: the recipe, one recording and its row of `takes.csv`; its `key` is what the store compares.
+- `make_recipe`, `find_origin`: read the files and make them.
+- `content_digest`, `code_digest`: of files and folders, and of our own modules.
+- `take_name`: the name of a take within its corpus.
+
+Descriptors are asked for by content, never by date or by name: a recording that is exported again, a layout with one
+marker moved, or another version of the solver gives another key.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from signface.corpus.manifest import TakeEntry
+from signface.errors import SignfaceError
+from signface.files import shipped
+
+#: The modules between a recording and its descriptors.
+SOLVING_CODE = ("takes", "face", "solve", "descriptors.py", "annotation.py", "corpus/describing.py")
+
+#: Recordings that hold weights: there is nothing to solve, and neither face nor layout matter.
+WEIGHTS_FORMATS = ("weights", "livelink")
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How the takes of a corpus are solved.
+
+    Parameters
+    ----------
+    face : str
+        A shipped name or a path, as it was given; empty for recordings that hold weights.
+    layout : str, optional
+        As it was given; None for the shipped layout that fits the markers best.
+    method : str
+    alpha : float, optional
+        None for the method's own.
+    face_digest, layout_digest : str
+        SHA-256 of the content of the face and of the layout (of all shipped layouts where one is chosen).
+    solver : str
+        SHA-256 of the modules that read and solve, so that no change of ours passes unseen.
+    """
+
+    face: str
+    layout: str | None
+    method: str
+    alpha: float | None
+    face_digest: str
+    layout_digest: str
+    solver: str
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of what matters of it: contents, not names."""
+        return _digest_of([self.method, self.alpha, self.face_digest, self.layout_digest, self.solver])
+
+    @property
+    def name(self) -> str:
+        """Short name, for a folder: the face's and ten digits of the digest."""
+        return f"{Path(self.face).stem or 'weights'}-{self.digest[:10]}"
+
+
+@dataclass(frozen=True)
+class Origin:
+    """One recording with all that its descriptors depend on.
+
+    Parameters
+    ----------
+    take : str
+        Name of the take within its corpus (`take_name`).
+    file : str
+        The recording's own name, with its ending.
+    signer, kind : str
+        As in `takes.csv`; they stand in the stored table.
+    recording : str
+        SHA-256 of the recording.
+    neutral_s, start_s : float, optional
+        As in `takes.csv`.
+    recipe : Recipe
+    """
+
+    take: str
+    file: str
+    signer: str
+    kind: str
+    recording: str
+    neutral_s: float | None
+    start_s: float | None
+    recipe: Recipe
+
+    @property
+    def key(self) -> str:
+        """SHA-256 of all of it."""
+        own = [self.take, self.file, self.signer, self.kind, self.recording, self.neutral_s, self.start_s]
+        return _digest_of([*own, self.recipe.digest])
+
+    def as_dict(self) -> dict[str, Any]:
+        """For the provenance of a stored file."""
+        return asdict(self)
+
+
+def make_recipe(
+    face: str = "default", layout: str | None = None, *, method: str = "thin-shell", alpha: float | None = None
+) -> Recipe:
+    """The recipe of a face and a layout, each a shipped name or a path.
+
+    Raises
+    ------
+    SignfaceError
+        There is no such face or layout.
+
+    Examples
+    --------
+    >>> make_recipe("default", "default-40").name  # doctest: +SKIP
+    'default-5f0c1e2ab4'
+    """
+    layouts = shipped("layouts", ".csv")
+    if layout is None:
+        layout_digest = _digest_of([[name, content_digest(file)] for name, file in layouts.items()])
+    else:
+        layout_digest = content_digest(layouts.get(layout, Path(layout)))
+    face_digest = content_digest(shipped("faces", ".glb").get(face, Path(face)))
+    return Recipe(face, layout, method, alpha, face_digest, layout_digest, code_digest(*SOLVING_CODE))
+
+
+def weights_recipe() -> Recipe:
+    """The recipe of recordings that hold weights already."""
+    return Recipe("", None, "none", None, "", "", code_digest(*SOLVING_CODE))
+
+
+def find_origin(entry: TakeEntry, folder: Path, recipe: Recipe) -> Origin:
+    """The origin of a row of `takes.csv`; reads the whole recording for its digest.
+
+    Parameters
+    ----------
+    entry : TakeEntry
+    folder : Path
+        The corpus.
+    recipe : Recipe
+        For a recording of markers; one that holds weights has its own.
+
+    Raises
+    ------
+    SignfaceError
+        The recording cannot be read, or is of no known format.
+    """
+    from signface.takes.reading import recognise
+
+    holds_weights = recognise(entry.path) in WEIGHTS_FORMATS
+    return Origin(
+        take=take_name(entry, folder),
+        file=entry.path.name,
+        signer=entry.signer,
+        kind=entry.kind,
+        recording=content_digest(entry.path),
+        neutral_s=None if holds_weights else entry.neutral_s,
+        start_s=entry.start_s,
+        recipe=weights_recipe() if holds_weights else recipe,
+    )
+
+
+def take_name(entry: TakeEntry, folder: Path) -> str:
+    """Path of a recording within its corpus, without its ending, with `/`; `..` of one outside becomes `up`.
+
+    Examples
+    --------
+    >>> take_name(TakeEntry(Path("corpus/S1/laugh.c3d"), "S1", "EU"), Path("corpus"))
+    'S1/laugh'
+    """
+    relative = Path(os.path.relpath(entry.path, folder)).with_suffix("")
+    return "/".join("up" if part == os.pardir else part for part in relative.parts)
+
+
+def content_digest(path: Path) -> str:
+    """SHA-256 of a file, or of the names and contents of the files of a folder.
+
+    Raises
+    ------
+    SignfaceError
+        There is no such file, or it cannot be read.
+    """
+    try:
+        if path.is_dir():
+            files = sorted(file for file in path.rglob("*") if file.is_file())
+            return _digest_of([[file.relative_to(path).as_posix(), content_digest(file)] for file in files])
+        with path.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except FileNotFoundError as error:
+        raise SignfaceError("no such file", file=path) from error
+    except OSError as error:
+        raise SignfaceError(f"cannot be read ({error.strerror})", file=path) from error
+
+
+@lru_cache
+def code_digest(*modules: str) -> str:
+    """SHA-256 of the sources of some of our modules and folders of modules, named from the package's own folder."""
+    package = Path(__file__).resolve().parents[1]
+    files = []
+    for module in modules:
+        path = package / module
+        files += sorted(path.rglob("*.py")) if path.is_dir() else [path]
+    return _digest_of([[file.relative_to(package).as_posix(), content_digest(file)] for file in files])
+
+
+def _digest_of(content: Any) -> str:
+    return hashlib.sha256(json.dumps(content, ensure_ascii=False).encode()).hexdigest()

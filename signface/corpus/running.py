@@ -1,0 +1,362 @@
+"""The whole corpus at once: every take solved and annotated, wherever the run was stopped before.
+
+- `run_corpus`: go through a corpus, yield an `Outcome` for each take.
+- `plan_jobs`: the jobs of a run, and the rows that cannot be one.
+- `annotate_job`: one take, in whatever process.
+
+What is done is known from the disk alone. The descriptors of a take are in the store under the key of their origin; its
+annotation is done when its log ends with the key of everything that the annotation depends on, and the log is written
+last. A run that was killed at any moment therefore repeats no more than the takes it was working on, and since no file
+holds the time of day (except the logs), it ends with the same bytes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+import hashlib
+import os
+import re
+import socket
+import time
+import traceback
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from signface.corpus.cluster import WorkerDied, on_cluster, on_cores
+from signface.corpus.describing import recipe_of, stored_or_solved
+from signface.corpus.manifest import Corpus, TakeEntry
+from signface.corpus.origin import (
+    SOLVING_CODE,
+    Recipe,
+    code_digest,
+    content_digest,
+    find_origin,
+    make_recipe,
+    take_name,
+)
+from signface.corpus.store import DescriptorStore
+from signface.errors import SignfaceError
+from signface.files import shipped, whole_file
+
+if TYPE_CHECKING:
+    from signface.label.model import TrainedModel
+
+#: Where annotations go when nothing else is said, in the folder of the corpus.
+ANNOTATED = "annotated"
+LOGS = "logs"
+LOCK = ".lock"
+
+#: The date in every file of a run: the same corpus gives the same bytes on any day.
+DATE = "2000-01-01T00:00:00+00:00"
+
+#: The modules between descriptors and annotation files.
+ANNOTATING_CODE = ("segment", "label", "elan", "annotation.py")
+
+#: What can become of a take. `corrected`: an annotator worked in its `.eaf`, which stays as it is.
+DONE, BEFORE, CORRECTED, FAILED = "done", "before", "corrected", "failed"
+
+
+@dataclass(frozen=True)
+class Job:
+    """All that a process needs to annotate one take.
+
+    Parameters
+    ----------
+    entry : TakeEntry
+    corpus : Path
+        Folder of the corpus.
+    output : Path
+        Folder of the annotations.
+    recipe : Recipe
+    classifier : str
+        A shipped name or a file.
+    model : str
+        SHA-256 of the classifier's file.
+    code : str
+        SHA-256 of the modules between descriptors and annotation.
+    """
+
+    entry: TakeEntry
+    corpus: Path
+    output: Path
+    recipe: Recipe
+    classifier: str
+    model: str
+    code: str
+
+    @property
+    def take(self) -> str:
+        """Name of the take in the corpus."""
+        return take_name(self.entry, self.corpus)
+
+    @property
+    def eaf(self) -> Path:
+        """Where its annotation goes."""
+        return self.output / f"{self.take}.eaf"
+
+    @property
+    def log(self) -> Path:
+        """Where its log goes."""
+        return self.output / LOGS / f"{self.take}.log"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a take.
+
+    Parameters
+    ----------
+    take : str
+    state : str
+        `done`, `before` (nothing was left to do), `corrected` (left as the annotator made it) or `failed`.
+    solved : bool
+        Whether descriptors had to be solved.
+    message : str
+        What was found, or what is wrong.
+    seconds : float
+        How long it took.
+    """
+
+    take: str
+    state: str
+    solved: bool = False
+    message: str = ""
+    seconds: float = 0.0
+
+
+def run_corpus(
+    corpus: Corpus,
+    *,
+    output: Path | None = None,
+    face: str = "default",
+    layout: str | None = None,
+    method: str = "thin-shell",
+    alpha: float | None = None,
+    classifier: str = "default",
+    workers: int | None = None,
+    scheduler: str | None = None,
+) -> Iterator[Outcome]:
+    """Solve and annotate every take of a corpus; what is there already is not done again.
+
+    Parameters
+    ----------
+    corpus : Corpus
+    output : Path, optional
+        Folder of the annotations; `annotated` in the corpus by default. The logs are in its folder `logs`.
+    face, layout, method, alpha, classifier :
+        As in `signface.annotation.annotate`; a take whose row names a face or a layout has its own.
+    workers : int, optional
+        Takes at a time on this machine; as many as it has cores by default.
+    scheduler : str, optional
+        Address of a Dask cluster to run on instead. Its machines see the corpus under the same path.
+
+    Yields
+    ------
+    Outcome
+        As the takes are done, in any order; a take that fails stops no other.
+
+    Raises
+    ------
+    SignfaceError
+        The run cannot begin: an output folder that cannot be written or in which another run is at work, two takes
+        of one name, no such face, layout or classifier, no cluster.
+
+    Examples
+    --------
+    >>> for outcome in run_corpus(read_corpus("corpora/feel")):  # doctest: +SKIP
+    ...     print(outcome.take, outcome.state)
+    """
+    folder = Path(os.path.abspath(corpus.folder))
+    output = folder / ANNOTATED if output is None else Path(os.path.abspath(output))
+    store = DescriptorStore(folder)  # says at once when a newer signface wrote it
+    recipe = make_recipe(face, layout, method=method, alpha=alpha)
+    jobs, failed = plan_jobs(corpus, output, recipe, classifier=classifier)
+    with only_run_in(output):
+        yield from failed
+        if scheduler is None:
+            results = on_cores(annotate_job, jobs, workers=min(workers or os.cpu_count() or 1, max(1, len(jobs))))
+        else:
+            results = on_cluster(annotate_job, jobs, scheduler=scheduler)
+        for job, result in results:
+            if isinstance(result, WorkerDied):
+                result = Outcome(job.take, FAILED, message=f"{job.entry.path}: {result}")
+                _write_log(job, [result.message, FAILED])
+            yield result
+        # Only now: a process of a run that was killed may have lived on for a while.
+        clean_output(output, jobs)
+        store.clean()
+
+
+def plan_jobs(corpus: Corpus, output: Path, recipe: Recipe, *, classifier: str) -> tuple[list[Job], list[Outcome]]:
+    """The jobs of a run, with absolute paths, and the takes whose own face or layout is not there.
+
+    Raises
+    ------
+    SignfaceError
+        Two takes would be written to the same file, or there is no such classifier.
+    """
+    model, code = model_digest(classifier), code_digest(*ANNOTATING_CODE)
+    folder = Path(os.path.abspath(corpus.folder))
+    known: dict[tuple[str, str | None], Recipe] = {}
+    jobs: dict[str, Job] = {}
+    failed = []
+    for entry in corpus:
+        name = take_name(entry, corpus.folder)
+        if name in jobs:
+            raise SignfaceError(
+                f"{jobs[name].entry.path.name} and {entry.path.name} would both be written to {name}.eaf",
+                file=folder,
+                hint="rename one of the recordings",
+            )
+        try:
+            own = recipe_of(entry, recipe, known)
+        except SignfaceError as error:
+            failed.append(Outcome(name, FAILED, message=f"{entry.path}: {error}"))
+            continue
+        jobs[name] = Job(_absolute(entry), folder, output, own, classifier, model, code)
+    return list(jobs.values()), failed
+
+
+def annotate_job(job: Job) -> Outcome:
+    """Solve and annotate one take and write its log; whatever goes wrong is told in the outcome, never raised."""
+    begun = time.monotonic()
+    notes: list[str] = []
+    try:
+        state, solved, message = _annotate(job, notes)
+    except SignfaceError as error:
+        state, solved, message = FAILED, False, str(error)
+    except Exception as error:  # a defect of ours in one take must not stop the others
+        state, solved = FAILED, False
+        message = f"{job.entry.path}: a defect of signface, {type(error).__name__}: {error}"
+        notes += traceback.format_exc().splitlines()
+    if state == FAILED:
+        with contextlib.suppress(SignfaceError, OSError):  # where nothing can be written, the outcome says so
+            _write_log(job, [*notes, message, FAILED])
+    return Outcome(job.take, state, solved, message, time.monotonic() - begun)
+
+
+def _annotate(job: Job, notes: list[str]) -> tuple[str, bool, str]:
+    """State, whether it was solved, and what was found; `notes` gets what the log should say."""
+    from signface.annotation import annotate, summarise, write_annotation
+    from signface.elan.export import check_writable
+
+    if (job.recipe.solver, job.code) != (code_digest(*SOLVING_CODE), code_digest(*ANNOTATING_CODE)):
+        raise SignfaceError(
+            f"{socket.gethostname()} has another version of signface than the machine that began the run",
+            hint="install the same one everywhere",
+        )
+    origin = find_origin(job.entry, job.corpus, job.recipe)
+    ending = f"{DONE} {_annotation_key(job, origin.key)}"
+    if job.eaf.is_file() and _last_line(job.log) == ending:
+        return BEFORE, False, ""
+    store = DescriptorStore(job.corpus)
+    descriptors, solved = stored_or_solved(job.entry, origin, store)
+    notes += [f"recording {origin.file} (SHA-256 {origin.recording})", *descriptors.history]
+    notes.append(f"{'solved into' if solved else 'taken from'} {store.path(origin)}")
+    try:
+        check_writable(job.eaf)
+    except SignfaceError as error:
+        _write_log(job, [*notes, str(error), CORRECTED])
+        return CORRECTED, solved, f"{job.eaf}: was worked in and stays as it is"
+    annotation = annotate(descriptors, model=_model(job.classifier, job.model))
+    write_annotation(
+        annotation, job.eaf, signer=job.entry.signer, video=job.entry.video, date=DATE, properties={"file": origin.file}
+    )
+    found = summarise(annotation)
+    _write_log(job, [*notes, found, f"written to {job.eaf}", ending])
+    return DONE, solved, found
+
+
+@contextlib.contextmanager
+def only_run_in(output: Path) -> Iterator[None]:
+    """Keep other runs out of an output folder; the lock goes with the process, however it ends.
+
+    Raises
+    ------
+    SignfaceError
+        Another run is at work there, or the folder cannot be written.
+    """
+    try:
+        import fcntl
+    except ModuleNotFoundError:  # no such locks on Windows: two runs then do the same work twice, no harm is done
+        yield
+        return
+    try:
+        (output / LOGS).mkdir(parents=True, exist_ok=True)
+        stream = (output / LOGS / LOCK).open("w")
+    except OSError as error:
+        raise SignfaceError(
+            f"cannot be written ({error.strerror})", file=output, hint="choose a folder you may write to: -o FOLDER"
+        ) from error
+    with stream:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise SignfaceError(
+                "another run is at work in this folder", file=output, hint="wait for it, or give another folder with -o"
+            ) from error
+        yield
+
+
+def clean_output(output: Path, jobs: list[Job]) -> None:
+    """Remove what a killed run left half written beside the files of these jobs (`signface.files.whole_file`)."""
+    ours = {job.eaf.with_name(name) for job in jobs for name in _names_of(job)} | {job.log for job in jobs}
+    for folder in {file.parent for file in ours}:
+        for part in folder.glob(".*"):
+            found = re.fullmatch(r"\.(.+)-[a-z0-9_]{8}(\.[a-z]+)", part.name)
+            if found and folder / (found[1] + found[2]) in ours:
+                part.unlink(missing_ok=True)
+
+
+def _names_of(job: Job) -> list[str]:
+    stem = job.eaf.stem
+    return [f"{stem}.eaf", f"{stem}.pfsx", f"{stem}.curves.csv", f"{stem}_tsconf.xml"]
+
+
+def _annotation_key(job: Job, descriptors: str) -> str:
+    """SHA-256 of all that an annotation depends on, from the key of the descriptors."""
+    video = "" if job.entry.video is None else os.path.relpath(job.entry.video, job.output)
+    parts = [descriptors, job.model, job.code, job.entry.signer, video]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+def _write_log(job: Job, lines: list[str]) -> None:
+    """Write the log of a take; its last line says what became of it."""
+    now = datetime.datetime.now().astimezone().isoformat(timespec="seconds")
+    with whole_file(job.log) as temporary:
+        temporary.write_text("\n".join([f"{job.take}, {now}, {socket.gethostname()}", *lines, ""]), encoding="utf-8")
+
+
+def _last_line(log: Path) -> str:
+    try:
+        return log.read_text(encoding="utf-8").rstrip("\n").rpartition("\n")[2]
+    except (OSError, UnicodeDecodeError):
+        return ""
+
+
+@lru_cache(maxsize=2)
+def _model(classifier: str, digest: str) -> TrainedModel:
+    """A classifier whose content is the one that was asked for."""
+    from signface.label.persistence import load_model
+
+    if model_digest(classifier) != digest:
+        raise SignfaceError("is not the classifier that the run began with", file=classifier, hint="run again")
+    return load_model(classifier)
+
+
+def model_digest(classifier: str) -> str:
+    """SHA-256 of the file of a classifier, a shipped name or a path."""
+    return content_digest(shipped("classifiers", ".skops").get(classifier, Path(classifier)))
+
+
+def _absolute(entry: TakeEntry) -> TakeEntry:
+    """A row with absolute paths: a worker may stand in another folder."""
+    return replace(
+        entry,
+        path=Path(os.path.abspath(entry.path)),
+        video=None if entry.video is None else Path(os.path.abspath(entry.video)),
+    )
