@@ -108,16 +108,17 @@ def differences_figure(responses: Responses, contrasts: StudyTable, models: Stud
     """
     questions = responses.questions
     with _style():
-        rows = max((contrasts.frame["", "question"] == name).sum() for name in questions.values())
-        longest = min(2 * LONGEST_NAME + 3, max(len(pair) for pair in contrasts.frame["", "pair"]))
-        figure = _figure(1.9 * len(questions) + 0.085 * longest + 1.2, 0.42 * rows + 1.1)
+        pairs = list(dict.fromkeys(contrasts.frame["", "pair"]))  # a question may not have been asked for every method
+        longest = min(2 * LONGEST_NAME + 3, max(map(len, pairs)))
+        figure = _figure(1.9 * len(questions) + 0.085 * longest + 1.2, 0.42 * len(pairs) + 1.1)
         panels = figure.subplots(1, len(questions), squeeze=False, sharey=True)[0]
         for axes, name in zip(panels, questions.values()):
             own = contrasts.frame[contrasts.frame["", "question"] == name]
             whole = (
                 models.frame.loc[models.frame["", "question"] == name, [("mixed model", "p (Holm)")]].to_numpy().min()
             )
-            for row, (_, contrast) in enumerate(own.iterrows()):
+            for _, contrast in own.iterrows():
+                row = pairs.index(contrast["", "pair"])
                 value, low, high = (contrast["difference of means", part] for part in ("first − second", "low", "high"))
                 shown = whole < alpha and contrast["mixed model", "p (Holm)"] < alpha
                 axes.errorbar(
@@ -132,8 +133,8 @@ def differences_figure(responses: Responses, contrasts: StudyTable, models: Stud
                 )
             axes.axvline(0, color="#888888", linewidth=1)
             axes.set_title(name)
-            axes.set_yticks(range(len(own)), [" – ".join(map(_short, pair.split(" – "))) for pair in own["", "pair"]])
-            axes.set_ylim(rows - 0.5, -0.5)
+            axes.set_yticks(range(len(pairs)), [" – ".join(map(_short, pair.split(" – "))) for pair in pairs])
+            axes.set_ylim(len(pairs) - 0.5, -0.5)
             axes.xaxis.grid(True, color="#e6e6e6")
             axes.set_axisbelow(True)
             axes.set_xlabel("shares" if name == questions.get("correct") else "points")
