@@ -7,6 +7,7 @@ import difflib
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
+from signface.solve.direct import ThinShellDeformation
 from signface.solve.linear import Bounded, LeastSquares, NonNegative
 from signface.solve.solver import Solver
 from signface.solve.thin_shell import ALPHA, ThinShellSolver
@@ -17,6 +18,10 @@ METHODS = {
     "least-squares": "least squares without bounds",
     "nnls": "non-negative least squares",
     "bounded": "least squares with weights from 0 to 1",
+    "direct-shell": "the skin bent by the markers alone, then read as weights",
+    "rbf-network": "a radial basis function network learnt from examples of the avatar",
+    "gaussian-process": "Gaussian process regression learnt from examples of the avatar",
+    "sparse-online-gp": "its sparse online form",
 }
 
 
@@ -39,8 +44,7 @@ def make_solver(method: str, face: FaceModel, layout: MarkerLayout, *, alpha: fl
     """
     if method == "thin-shell":
         return ThinShellSolver(face, layout, alpha=ALPHA if alpha is None else alpha)
-    rivals = {"least-squares": LeastSquares, "nnls": NonNegative, "bounded": Bounded}
-    if method not in rivals:
+    if method not in METHODS:
         close = difflib.get_close_matches(method, METHODS, n=1)
         raise SignfaceError(
             f"no method is called {method!r}",
@@ -48,4 +52,16 @@ def make_solver(method: str, face: FaceModel, layout: MarkerLayout, *, alpha: fl
         )
     if alpha is not None:
         raise SignfaceError(f"the method {method} has no alpha", hint="leave --alpha out, or use thin-shell")
-    return rivals[method](face, layout)
+    rivals = {"least-squares": LeastSquares, "nnls": NonNegative, "bounded": Bounded}
+    if method in rivals:
+        return rivals[method](face, layout)
+    if method == "direct-shell":
+        return ThinShellDeformation(face, layout)
+    from signface.solve import regression
+
+    learnt = {
+        "rbf-network": regression.RbfNetwork,
+        "gaussian-process": regression.GaussianProcess,
+        "sparse-online-gp": regression.SparseOnlineGaussianProcess,
+    }
+    return learnt[method](face, layout)

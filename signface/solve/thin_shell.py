@@ -5,7 +5,10 @@ The energy of the weights `c` of one frame is
     E(c) = D(c) + TOLERANCE^2 * alpha * T(c) + (1 - alpha) * H(c)
 
 - `D`: squared distances between the given and the solved markers, summed over the markers present, divided by what
-  one typical base does to all markers (`MarkerBases.scale`): 1 is a typical base missed altogether.
+  one typical base does to all markers (`MarkerBases.scale`): 1 is a typical base missed altogether. The head markers
+  creep too, and every face marker then moves with them as one. `D` therefore is the least over small rigid motions
+  `h` of the head (three shifts, three turns), whose own square is added divided by `HEAD_SLACK`: with a slack of 0.3, a
+  shift of the head is as likely as errors of half its size in all markers.
 - `T`: the thin-shell energy of the deformed skin, half stretching and half bending, each divided by its mean over the
   bases that the markers observe: 1 is one typical base, fully active.
 - `H`: what holds the weights from 0 to 1 and at rest (`signface.solve.bounds`), summed over the weights.
@@ -39,6 +42,9 @@ TOLERANCE = 0.05
 ALPHA = 0.3
 #: Weight of the rest energy.
 SPARSITY = 0.004
+#: Variance of the head's residual shift (and of its turn, at the markers' distance from their centre) beside that of a
+#: marker's coordinate.
+HEAD_SLACK = 0.3
 #: The largest component of the gradient at which a frame counts as solved. Energies are of the order of 1.
 GRADIENT = 1e-8
 #: Frames solved at a time, so that a long take needs little memory.
@@ -56,6 +62,11 @@ class ThinShellSolver:
         Weight of the thin shell, from 0 (only bounds and rest regularise) to 1 (only the shell does).
     sparsity : float
         Weight of the rest energy, 0 or more: what decides between explanations that the markers hardly tell apart.
+    head_slack : float
+        How far the head's motion may have been taken away wrongly, 0 or more; 0 trusts the head markers.
+    signer_bases : (N, P, 3) array, optional
+        The bases as this signer shows them at the markers (`signface.solve.calibration.calibrate`); by default the
+        avatar's.
     threads : int, optional
         Cores to use; all by default.
 
@@ -84,12 +95,16 @@ class ThinShellSolver:
         *,
         alpha: float = ALPHA,
         sparsity: float = SPARSITY,
+        head_slack: float = HEAD_SLACK,
+        signer_bases: np.ndarray | None = None,
         threads: int | None = None,
     ) -> None:
         if not (np.isfinite(alpha) and 0.0 <= alpha <= 1.0):
             raise SignfaceError(f"alpha must lie between 0 and 1, not {alpha}")
         if not (np.isfinite(sparsity) and sparsity >= 0.0):
             raise SignfaceError(f"sparsity must be 0 or more, not {sparsity}")
+        if not (np.isfinite(head_slack) and head_slack >= 0.0):
+            raise SignfaceError(f"head_slack must be 0 or more, not {head_slack}")
         self.names = face.names
         self.alpha, self.sparsity, self.threads = float(alpha), float(sparsity), threads
         self.markers = MarkerBases(face, layout, skin=self.alpha > 0.0)
@@ -100,12 +115,21 @@ class ThinShellSolver:
             shell += 0.5 * seen / np.diag(seen).mean()
         self.shell = TOLERANCE**2 * self.alpha * shell
         self.holding = 1.0 - self.alpha
-        self._columns = self.markers.matrix[:, observed]
-        normal = self._columns.T @ self._columns / self.markers.scale + self.shell
+        # The head's six motions stand beside the bases. The inverse's part that belongs to the bases is what solving
+        # for both and keeping the weights amounts to.
+        self._n = len(shell)
+        motions = _rigid_motions(layout.points(face)) if head_slack > 0.0 else np.empty((3 * self.markers.n_markers, 0))
+        self._columns = np.hstack([self.markers.matrix[:, observed], motions]) / np.sqrt(self.markers.scale)
+        self._prior = np.zeros((self._columns.shape[1],) * 2)
+        self._prior[: self._n, : self._n] = self.shell
+        slack = np.arange(self._n, len(self._prior))
+        self._prior[slack, slack] = 1.0 / (head_slack * self.markers.scale) if head_slack > 0.0 else 0.0
+        full = self._columns.T @ self._columns + self._prior
         # Rounding must not make bases that are opposed to one another (an eye turned in and out) undetermined.
-        normal[np.diag_indices_from(normal)] += 1e-12 * np.trace(normal)
-        self._normal = 0.5 * (normal + normal.T)
-        self._inverse = _inverse(self._normal)
+        own = np.arange(self._n)
+        full[own, own] += 1e-12 * np.trace(full[: self._n, : self._n])
+        self._full = 0.5 * (full + full.T)
+        self._inverse = _inverse(self._full)
         self._pattern = np.ones(self.markers.n_markers, dtype=bool)
         self._pattern_inverse = self._inverse
         self._last: np.ndarray | None = None
@@ -113,9 +137,18 @@ class ThinShellSolver:
     def energy(self, weights: np.ndarray, displacements: np.ndarray) -> np.ndarray:
         """(F,) energy of (F, N) weights for (F, P, 3) displacements: what `solve` minimises."""
         rows, present = self.markers.checked(displacements)
-        error = (weights @ self.markers.matrix.T - rows) * np.repeat(present, 3, axis=1)
+        error = (weights @ self.markers.matrix.T - rows) / np.sqrt(self.markers.scale)
         own = weights[:, self.markers.observed]
-        data = np.einsum("fi,fi->f", error, error) / self.markers.scale
+        data = np.zeros(len(rows))
+        for pattern, frames in presence_patterns(present):
+            seen = np.repeat(pattern, 3)
+            # The least over the head's motions h of |error + J h|^2 + h' P h, by stacking both.
+            motions = self._columns[seen, self._n :]
+            stacked = np.vstack([motions, np.sqrt(self._prior[self._n :, self._n :])])
+            wanted = np.zeros((len(stacked), len(frames)))
+            wanted[: len(motions)] = error[np.ix_(frames, seen)].T
+            left = wanted - stacked @ np.linalg.lstsq(stacked, wanted, rcond=None)[0]
+            data[frames] = (left**2).sum(axis=0)
         shell = np.einsum("fi,ij,fj->f", own, self.shell, own)
         return data + shell + self.holding * holding_energy(own, self.sparsity).sum(axis=1)
 
@@ -143,12 +176,12 @@ class ThinShellSolver:
     def _solve_chunk(self, displacements: np.ndarray) -> Solution:
         rows, present = self.markers.checked(displacements)
         weights = np.zeros((len(rows), len(self.names)))
-        right = rows @ (self._columns / self.markers.scale)  # a missing marker's row is 0
+        right = rows @ (self._columns / np.sqrt(self.markers.scale))  # a missing marker's row is 0
         for pattern, frames in presence_patterns(present):
             inverse = self._inverse_for(pattern)
             weights[np.ix_(frames, self.markers.observed)] = minimise(
-                right[frames] @ inverse,
-                inverse,
+                right[frames] @ inverse[:, : self._n],
+                inverse[: self._n, : self._n],
                 bounds=self.holding,
                 sparsity=self.sparsity,
                 tolerance=GRADIENT,
@@ -174,10 +207,10 @@ class ThinShellSolver:
         if present.any():
             if (present[0] != self._pattern).any():
                 self._pattern, self._pattern_inverse = present[0], self._inverse_for(present[0])
-            right = rows @ self._columns / self.markers.scale
+            right = rows @ self._columns / np.sqrt(self.markers.scale)
             self._last = minimise(
-                right @ self._pattern_inverse,
-                self._pattern_inverse,
+                right @ self._pattern_inverse[:, : self._n],
+                self._pattern_inverse[: self._n, : self._n],
                 bounds=self.holding,
                 sparsity=self.sparsity,
                 tolerance=GRADIENT,
@@ -213,8 +246,9 @@ class ThinShellSolver:
         # D is the squared error over `scale`: a log-likelihood is it times scale / (2 * marker_error^2).
         factor = marker_error / np.sqrt(self.markers.scale)
         diagonal = np.arange(own.shape[1])
+        normal = np.linalg.inv(self._inverse[: self._n, : self._n])
         for start in range(0, len(own), 1024):
-            hessian = np.broadcast_to(self._normal, (len(own[start : start + 1024]), *self._normal.shape)).copy()
+            hessian = np.broadcast_to(normal, (len(own[start : start + 1024]), *normal.shape)).copy()
             hessian[:, diagonal, diagonal] += 0.5 * held[start : start + 1024]
             variance = np.linalg.inv(hessian)[:, diagonal, diagonal]
             result[start : start + 1024, observed] = factor * np.sqrt(np.maximum(variance, 0.0))
@@ -228,12 +262,25 @@ class ThinShellSolver:
         """
         if pattern.all():
             return self._inverse
-        gone = self._columns[np.repeat(~pattern, 3)] / np.sqrt(self.markers.scale)
+        gone = self._columns[np.repeat(~pattern, 3)]
         if 3 * len(gone) > len(self._inverse):
-            return _inverse(self._normal - gone.T @ gone)
+            return _inverse(self._full - gone.T @ gone)
         across = self._inverse @ gone.T
         inner = np.eye(len(gone)) - gone @ across
         return self._inverse + across @ np.linalg.solve(inner, across.T)
+
+
+def _rigid_motions(points: np.ndarray) -> np.ndarray:
+    """(3P, 6) displacements of (P, 3) points by the shifts along and the small turns about the three axes.
+
+    The turns go through the points' centre and are scaled to the same root mean square displacement for all sizes.
+    """
+    spread = points - points.mean(axis=0)
+    spread /= np.sqrt((spread**2).sum(axis=1).mean())
+    axes = np.eye(3)
+    shifts = [np.tile(axis, (len(points), 1)) for axis in axes]
+    turns = [np.cross(axis, spread) for axis in axes]
+    return np.stack([*shifts, *turns], axis=-1).reshape(-1, 6)
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:
