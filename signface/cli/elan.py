@@ -24,17 +24,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Fill the parser of this command."""
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
 
-    check = actions.add_parser("check", help="say what is wrong with EAF files")
+    def action(name: str, summary: str, example: str) -> argparse.ArgumentParser:
+        return actions.add_parser(
+            name, help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=f"example: {example}"
+        )
+
+    check = action("check", "say what is wrong with EAF files", "signface elan check corrected/*.eaf")
     check.add_argument("files", nargs="+", type=Path, metavar="EAF")
     check.add_argument(
         "--duration", type=float, metavar="SECONDS", help="length of the film; annotations after it are named"
     )
 
-    mapping = actions.add_parser("map", help="write a first mapping file for a lab's template")
+    mapping = action(
+        "map", "write a first mapping file for a lab's template", "signface elan map lab.etf -o mapping.toml"
+    )
     mapping.add_argument("template", type=Path, metavar="ETF_OR_EAF")
     mapping.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="a .toml file")
 
-    learn = actions.add_parser("learn", help="show what annotators corrected, and train on it")
+    learn = action(
+        "learn",
+        "show what annotators corrected, and train on it",
+        "signface elan learn corpora/mine -o mine.skops --with corpora/feel",
+    )
     learn.add_argument("corpus", type=Path, metavar="CORPUS", help="a corpus whose annotations were corrected")
     learn.add_argument("-o", "--output", type=Path, metavar="MODEL", help="a .skops file; nothing is trained without")
     learn.add_argument(
@@ -50,7 +61,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     learn.add_argument("--seed", type=int, default=0, help="default: %(default)s")
 
-    agree = actions.add_parser("agree", help="agreement between annotators, or between one and the machine")
+    agree = action(
+        "agree",
+        "agreement between annotators, or between one and the machine",
+        "signface elan agree eva.eaf tom.eaf machine.eaf -o agreement/",
+    )
     agree.add_argument("files", nargs="+", type=Path, metavar="EAF", help="two or more files of one take")
     agree.add_argument(
         "--tier", action="append", default=[], metavar="NAME",
@@ -63,7 +78,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     agree.add_argument("--gamma", action="store_true", help="compute gamma too (slow)")
     agree.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="also write tables (.csv) and pictures")
 
-    install = actions.add_parser("install-recogniser", help="write the recogniser that ELAN itself runs")
+    install = action(
+        "install-recogniser",
+        "write the recogniser that ELAN itself runs",
+        "signface elan install-recogniser --elan /opt/ELAN_7-0",
+    )
     install.add_argument("--elan", type=Path, metavar="FOLDER", help="where ELAN is installed")
     install.add_argument(
         "-o", "--output", type=Path, default=Path("signface-recogniser"), metavar="FOLDER",
