@@ -37,6 +37,7 @@ from signface.files import bundled_corpus
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
 
 FOLDER = "descriptors"
 
@@ -73,7 +74,7 @@ class DescriptorStore:
         for recipe in self.recipes():
             first = next(stored_files(recipe), None)
             if first is not None:
-                _metadata(first)
+                _metadata(first, _content(first))
 
     def recipes(self) -> list[Path]:
         """Folders of the recipes there are, sorted."""
@@ -98,9 +99,10 @@ class DescriptorStore:
         if not file.is_file():
             return None
         try:
-            if _metadata(file)["key"] != origin.key:
+            content = _content(file)
+            if _metadata(file, content)["key"] != origin.key:
                 return None
-            return read_stored(file)
+            return _from_parquet(file, content)
         except NewerStore:
             raise
         except SignfaceError:
@@ -212,27 +214,8 @@ def read_stored(path: str | PathLike[str]) -> Descriptors:
     SignfaceError
         The file is missing, damaged, no file of a store, or was written by a newer signface.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     file = Path(path)
-    about = _metadata(file)
-    try:
-        table = pq.read_table(file, page_checksum_verification=True, partitioning=None)
-        columns = [column(name) for name in about["bases"]]
-        weights = [table[name].to_numpy() for name in columns]
-        return Descriptors(
-            weights=np.stack(weights, axis=1) if weights else np.zeros((table.num_rows, 0)),
-            names=tuple(about["bases"]),
-            rate=float.fromhex(about["rate"]),
-            start=float.fromhex(about["start"]),
-            residual=table["residual_mm"].to_numpy(),
-            head=np.stack([table[name].to_numpy() for name in HEAD], axis=1).reshape(-1, 4, 4),
-            name=about["name"],
-            history=tuple(about["history"]),
-        )
-    except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
-        raise SignfaceError("is damaged", file=file, hint="delete it: the take is then solved again") from error
+    return _from_parquet(file, _content(file))
 
 
 def read_provenance(path: str | PathLike[str]) -> dict[str, Any]:
@@ -243,7 +226,7 @@ def read_provenance(path: str | PathLike[str]) -> dict[str, Any]:
     SignfaceError
         As `read_stored`.
     """
-    return _metadata(Path(path))
+    return _metadata(Path(path), _content(Path(path)))
 
 
 def column(base: str) -> str:
@@ -292,14 +275,24 @@ def _as_parquet(origin: Origin, descriptors: Descriptors) -> bytes:
     return buffer.getvalue()
 
 
-def _metadata(file: Path) -> dict[str, Any]:
+def _content(file: Path) -> pa.BufferReader:
+    """The bytes of a file, read once: another writer may replace it at any moment."""
+    import pyarrow as pa
+
+    try:
+        return pa.BufferReader(file.read_bytes())
+    except FileNotFoundError as error:
+        raise SignfaceError("no such file", file=file) from error
+    except OSError as error:
+        raise SignfaceError(f"cannot be read ({error.strerror})", file=file) from error
+
+
+def _metadata(file: Path, content: pa.BufferReader) -> dict[str, Any]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    if not file.is_file():
-        raise SignfaceError("no such file", file=file)
     try:
-        about = json.loads((pq.read_metadata(file).metadata or {})[METADATA])
+        about = json.loads((pq.read_metadata(content).metadata or {})[METADATA])
         written = int(about["format"])
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
         raise SignfaceError("is no descriptors of a store, or is cut off", file=file, hint="delete it") from error
@@ -310,6 +303,29 @@ def _metadata(file: Path) -> dict[str, Any]:
             hint="update signface; nothing was changed",
         )
     return about
+
+
+def _from_parquet(file: Path, content: pa.BufferReader) -> Descriptors:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    about = _metadata(file, content)
+    try:
+        with pq.ParquetFile(content, page_checksum_verification=True) as parquet:
+            table = parquet.read()
+        weights = [table[column(name)].to_numpy() for name in about["bases"]]
+        return Descriptors(
+            weights=np.stack(weights, axis=1) if weights else np.zeros((table.num_rows, 0)),
+            names=tuple(about["bases"]),
+            rate=float.fromhex(about["rate"]),
+            start=float.fromhex(about["start"]),
+            residual=table["residual_mm"].to_numpy(),
+            head=np.stack([table[name].to_numpy() for name in HEAD], axis=1).reshape(-1, 4, 4),
+            name=about["name"],
+            history=tuple(about["history"]),
+        )
+    except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
+        raise SignfaceError("is damaged", file=file, hint="delete it: the take is then solved again") from error
 
 
 def _owner() -> str:
