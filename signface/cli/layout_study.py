@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +12,8 @@ from signface.errors import SignfaceError
 
 if TYPE_CHECKING:
     from signface.face.model import FaceModel
+    from signface.placement.actors import Actor
+    from signface.placement.layout_study import Cell, Entry, Plan
     from signface.placement.sites import Rules
 
 EXAMPLE = (
@@ -114,43 +118,48 @@ def _rules(arguments: argparse.Namespace, face: FaceModel) -> Rules:
     return Rules(not arguments.asymmetric, tuple(zones), tuple(spheres), arguments.apart, fixed)
 
 
-def _warn(face: FaceModel, actors: list) -> None:
+def _warn(face: FaceModel, actors: list[Actor]) -> list[str]:
     """Say which expressions the layouts will not see."""
     from signface.placement.choosing import unseen_bases
 
     never, _ = unseen_bases(face, actors)
+    words = f"the range of motion never shows {', '.join(never)}: layouts chosen from it may not see them"
     if never:
-        print(f"warning: the range of motion never shows {', '.join(never)}: layouts chosen from it may not see them")
+        print(f"warning: {words}", file=sys.stderr)
+    return [words] if never else []
 
 
 def _optimise(arguments: argparse.Namespace) -> None:
     from signface.face.layout_files import write_layout
     from signface.face.reading import read_face
     from signface.placement.actors import draw_actors
-    from signface.placement.choosing import Material, choose
+    from signface.placement.choosing import METHODS, Material, choose
+    from signface.render.layout_sheet import draw_sheet
 
     face = read_face("default")
     rules = _rules(arguments, face)
     actors = draw_actors(face, arguments.actors, seconds=arguments.seconds, seed=arguments.seed)
     _warn(face, actors)
     layout = choose(Material(face, actors, rules), arguments.method, arguments.markers, seed=arguments.seed)
+    sheet = arguments.output.with_name(f"{arguments.output.stem}-sheet.pdf")
+    layout = replace(layout, name=arguments.output.stem)
     write_layout(layout, arguments.output, face)
+    draw_sheet(face, layout, sheet, note=f"Chosen by: {METHODS[arguments.method]}.")
     print(f"{arguments.output}: {len(layout.face_labels)} face markers, {len(layout.head_labels)} head markers")
+    print(f"{sheet}: for the person who glues them")
 
 
 def _study(arguments: argparse.Namespace) -> None:
-    import os
-
-    from joblib import Parallel, delayed
-
-    from signface.cli.progress import progress
+    from signface.face.layout_files import write_layout
     from signface.face.reading import read_face
     from signface.files import whole_file
     from signface.placement import layout_study
     from signface.placement.actors import draw_actors
-    from signface.placement.choosing import METHODS
+    from signface.placement.choosing import METHODS, Material, choose
+    from signface.render.layout_sheet import distances, draw_sheet
+    from signface.report.layout_study_page import study_page
 
-    face = read_face("default")
+    face, folder = read_face("default"), Path(arguments.output)
     rules = _rules(arguments, face)
     plan = layout_study.Plan(
         actors=arguments.actors,
@@ -164,32 +173,64 @@ def _study(arguments: argparse.Namespace) -> None:
         seed=arguments.seed,
     )
     actors = draw_actors(face, plan.actors, seconds=plan.seconds, seed=plan.seed)
-    _warn(face, actors[: plan.selection])
+    warnings = _warn(face, actors[: plan.selection])
+    print("choosing markers on actors " + ", ".join(actor.name for actor in actors[: plan.selection]), flush=True)
     entries = layout_study.make_layouts(plan, face, actors, rules)
+    method, rivals = layout_study.recommend(plan, face, actors, rules)
+    material = Material(face, actors[: plan.selection], rules)
+    chosen = replace(choose(material, method, plan.recommended, seed=plan.seed), name=f"recommended-{plan.recommended}")
+    entries.append(layout_study.Entry(chosen, "recommended"))
+    cells = _run_cells(arguments, plan, face, actors, entries)
+    table = layout_study.collect(cells, int(face.moving.sum()))
+
+    for name, frame in (("errors", table), ("summary", layout_study.summarise(table)), ("choice_of_method", rivals)):
+        with whole_file(folder / f"{name}.csv") as temporary:
+            frame.to_csv(temporary, index=False, float_format="%.5f")
+    for entry in entries:
+        write_layout(entry.layout, folder / "layouts" / f"{entry.layout.name}.csv", face)
+    write_layout(chosen, folder / f"{chosen.name}.csv", face)
+    with whole_file(folder / f"{chosen.name}-distances.csv") as temporary:
+        distances(chosen, face).to_csv(temporary, index=False)
+    for ending in ("pdf", "svg", "png"):
+        draw_sheet(face, chosen, folder / f"{chosen.name}-sheet.{ending}", note=f"Chosen by: {METHODS[method]}.")
+    page = study_page(plan, face, entries, cells, table, method=method, material=material, warnings=warnings)
+    with whole_file(folder / "report.html") as temporary:
+        temporary.write_text(page, encoding="utf-8")
+    print(f"{folder / 'report.html'}: report; {chosen.name}.csv and its sheet beside it")
+
+
+def _run_cells(
+    arguments: argparse.Namespace, plan: Plan, face: FaceModel, actors: list[Actor], entries: list[Entry]
+) -> list[Cell]:
+    """Every cell of the study, those done before read back."""
+    import os
+
+    from joblib import Parallel, delayed
+
+    from signface.cli.progress import progress
+    from signface.placement import layout_study
+
     tested = [actor.name for actor in actors[plan.selection :]]
     work = [(entry, condition, draw) for entry in entries for condition, draw in layout_study.conditions(plan)]
     folder = Path(arguments.output) / "cells"
     files = [folder / f"{layout_study.cell_key(plan, *own, tested)}.npz" for own in work]
-    left = [k for k, file in enumerate(files) if layout_study.load_cell(file) is None]
-    if len(left) < len(work):
-        print(f"{len(work) - len(left)} of {len(work)} cells were done before")
-    jobs = arguments.jobs or os.cpu_count() or 1
-    runs = Parallel(n_jobs=min(jobs, max(1, len(left))), return_as="generator")(
-        delayed(layout_study.run_cell)(face, work[k][0], actors, tested, work[k][1], work[k][2]) for k in left
+    known = {file: layout_study.load_cell(file) for file in files}
+    left = {file: own for file, own in zip(files, work) if known[file] is None}
+    if len(left) < len(known):
+        print(f"{len(known) - len(left)} of {len(known)} cells were done before", flush=True)
+    jobs = min(arguments.jobs or os.cpu_count() or 1, max(1, len(left)))
+    runs = Parallel(n_jobs=jobs, return_as="generator")(
+        delayed(layout_study.run_cell)(face, *own[:1], actors, tested, *own[1:]) for own in left.values()
     )
-    for k, errors in zip(left, progress(runs, "studying", total=len(left))):
-        layout_study.save_cell(errors, files[k])
-    cells = []
-    for (entry, condition, draw), file in zip(work, files):
-        errors = layout_study.load_cell(file)
-        if errors is None:
-            raise SignfaceError("cannot be read back", file=file, hint="is the disk full? run the study again")
-        cells.append(layout_study.Cell(entry.layout.name, entry.family, len(entry.layout.face_labels), condition, draw,
-                                       tuple(errors)))  # fmt: skip
-    table = layout_study.collect(cells, int(face.moving.sum()))
-    with whole_file(Path(arguments.output) / "errors.csv") as temporary:
-        table.to_csv(temporary, index=False, float_format="%.5f")
-    print(layout_study.summarise(table).to_string(index=False, float_format="%.3f"))
+    for file, errors in zip(left, progress(runs, "studying layouts", total=len(left))):
+        layout_study.save_cell(errors, file)
+        known[file] = errors
+    return [
+        layout_study.Cell(
+            entry.layout.name, entry.family, len(entry.layout.face_labels), condition, draw, tuple(errors)
+        )
+        for (entry, condition, draw), errors in ((own, known[file] or []) for own, file in zip(work, files))
+    ]
 
 
 def _numbers(word: str) -> tuple[int, ...]:

@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -87,18 +88,24 @@ class Material:
             mirror = np.where(mirror < 0, np.arange(len(moving)), mirror)
         return trajectories([skin[:, moving] for skin in self.skins], mirror)
 
-    def criterion(self, method: str, count: int) -> Criterion:
-        """What forward selection goes by."""
-        if method == "thin-shell":
-            return ThinShell(self.sites, self.face, np.concatenate(self.skins))
-        if method in ("a-optimal", "d-optimal"):
-            return Design(self.sites, self.face, count, skin_metric(self.face) if method == "a-optimal" else None)
+    @cached_property
+    def _shell(self) -> ThinShell:
+        return ThinShell(self.sites, self.face, np.concatenate(self.skins))
+
+    @cached_property
+    def _reconstruction(self) -> Reconstruction:
         union = self.sites.union
         positions = np.concatenate([skin[:, union] - skin[:, union].mean(axis=0) for skin in self.skins])
         shown = [actor.shown(weights) for actor, weights in zip(self.actors, self.weights)]
         targets = np.concatenate([own - own.mean(axis=0) for own in shown])
         noise = placement_noise(self.face, np.concatenate(self.skins), union)
         return Reconstruction(self.sites, positions, targets, skin_metric(self.face), noise)
+
+    def criterion(self, method: str, count: int) -> Criterion:
+        """What forward selection goes by, before any marker is chosen."""
+        if method in ("a-optimal", "d-optimal"):
+            return Design(self.sites, self.face, count, skin_metric(self.face) if method == "a-optimal" else None)
+        return copy.copy(self._shell if method == "thin-shell" else self._reconstruction)
 
     def clusters(self, count: int, *, seed: int = 0) -> Clusters:
         """The clusters of k-means and their markers."""

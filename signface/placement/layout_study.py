@@ -29,13 +29,11 @@ from signface.files import whole_file
 from signface.placement.actors import Actor
 from signface.placement.choosing import METHODS, Material, choose
 from signface.placement.empirical import EMPIRICAL, place_layout
-from signface.placement.evaluation import MAPPINGS, Errors, evaluate_layout
+from signface.placement.evaluation import Errors, evaluate_layout
 from signface.placement.sites import Rules
 
 #: Changes when a cell's numbers would: cells of an older study are then computed anew.
 VERSION = 1
-#: Families as reports group them; a method's family is its own.
-FAMILIES = {"man": "manual (MAN)", "star": "published (STAR)", "default": "default"}
 
 
 @dataclass(frozen=True)
@@ -90,7 +88,7 @@ class Entry:
     ----------
     layout : MarkerLayout
     family : str
-        A key of `FAMILIES`, or a method.
+        `man`, `star`, `default`, `recommended`, or a method.
     """
 
     layout: MarkerLayout
@@ -238,8 +236,3 @@ def recommend(plan: Plan, face: FaceModel, actors: list[Actor], rules: Rules) ->
     shares = table["rms_mm"] / table.groupby("mapping")["rms_mm"].transform("mean")
     scores = shares.groupby(table["method"]).mean()
     return str(scores.idxmin()), table
-
-
-def mapping_names() -> dict[str, str]:
-    """The mappings and how reports call them."""
-    return dict(MAPPINGS)

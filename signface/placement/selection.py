@@ -6,6 +6,8 @@
   Optimization for Facial Motion Acquisition and Deformation", 2013).
 - `select`: forward selection by one of them, under the captor's rules.
 
+Adding a marker replaces these arrays and never writes into them, so that a shallow copy starts afresh.
+
 All three keep what is not yet known given the markers so far (a conditional covariance, an information matrix, a
 residual) and update it by each marker, so that a choice among hundreds of places takes milliseconds. Forward selection
 is not the optimum; for the determinant it comes within 37 % of it (G. Nemhauser, L. Wolsey and M. Fisher, 1978).
@@ -155,8 +157,8 @@ class Reconstruction(_OnUnion):
         cross = self._cross[rows].copy()
         gain = np.linalg.solve(inner, cross)
         self.error -= float((cross * gain).sum())
-        self._cross -= across @ gain
-        self._covariance -= across @ np.linalg.solve(inner, across.T)
+        self._cross = self._cross - across @ gain
+        self._covariance = self._covariance - across @ np.linalg.solve(inner, across.T)
 
 
 class Design(_OnUnion):
@@ -205,7 +207,7 @@ class Design(_OnUnion):
         """Add the information of markers at these vertices."""
         own = self._columns[self.rows(vertices)]
         spread = own @ self._covariance
-        self._covariance -= spread.T @ np.linalg.solve(spread @ own.T + np.eye(len(own)), spread)
+        self._covariance = self._covariance - spread.T @ np.linalg.solve(spread @ own.T + np.eye(len(own)), spread)
 
 
 class ThinShell(_OnUnion):
