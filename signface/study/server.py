@@ -127,7 +127,8 @@ class Questionnaire:
             "consent.html", language, form_token=self.key.token(visit), known=known, mistakes={}, here="/"
         )
         self._keep(page, request, "visit", visit, days=1)
-        self._keep(page, request, "language", language, days=KEPT_DAYS)
+        if request.query_params.get("language") == language:
+            self._keep(page, request, "language", language, days=KEPT_DAYS)
         return page
 
     def begin(self, request: Request, fields: dict[str, str]) -> Response:
@@ -338,7 +339,7 @@ class Questionnaire:
     def refuse(self, request: Request, status: int, reason: str) -> Response:
         """Log a refusal in one line, without an address or a token, and say so on a page."""
         self.refusals += 1
-        place = request.url.path[:80].encode("unicode_escape").decode("ascii")
+        place = request.scope["path"][:80].encode("unicode_escape").decode("ascii")
         if place.startswith(("/resume/", "/organiser/")):
             place = place[: place.index("/", 1)]
         log.warning("refused %s %s: %s (%d)", request.method, place, reason, status)
