@@ -72,6 +72,8 @@ class MarkerBases:
     skin : bool
         Whether the solver also weighs the skin between the markers, as a thin shell does: bases must then differ
         somewhere on the skin, not at the markers, and few markers will do.
+    signer_bases : (N, P, 3) array, optional
+        Displacements of the markers by the bases, where they are not the avatar's.
 
     Attributes
     ----------
@@ -90,8 +92,22 @@ class MarkerBases:
         `skin`, on the whole skin).
     """
 
-    def __init__(self, face: FaceModel, layout: MarkerLayout, *, skin: bool = False) -> None:
+    def __init__(
+        self,
+        face: FaceModel,
+        layout: MarkerLayout,
+        *,
+        skin: bool = False,
+        signer_bases: np.ndarray | None = None,
+    ) -> None:
         bases = layout.bases(face)
+        if signer_bases is not None:
+            if np.shape(signer_bases) != bases.shape or not np.isfinite(signer_bases).all():
+                raise SignfaceError(
+                    f"the signer's bases have the shape {np.shape(signer_bases)}, not {bases.shape}, or are not finite",
+                    hint="calibrate the signer with this face and layout",
+                )
+            bases = np.asarray(signer_bases, dtype=np.float64)
         self.names = face.names
         self.face_name = face.name
         self.labels = layout.face_labels

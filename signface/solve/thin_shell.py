@@ -107,7 +107,7 @@ class ThinShellSolver:
             raise SignfaceError(f"head_slack must be 0 or more, not {head_slack}")
         self.names = face.names
         self.alpha, self.sparsity, self.threads = float(alpha), float(sparsity), threads
-        self.markers = MarkerBases(face, layout, skin=self.alpha > 0.0)
+        self.markers = MarkerBases(face, layout, skin=self.alpha > 0.0, signer_bases=signer_bases)
         observed = self.markers.observed
         shell = np.zeros((int(observed.sum()),) * 2)
         for part in thin_shell_matrices(face):

@@ -1,0 +1,100 @@
+"""Synthetic signers whom no solver has met, with their takes brought to the avatar.
+
+- `make_recordings`: takes of some signers, prepared for solving, with the weights that show the same on the avatar.
+- `own_face`: markers on the avatar itself.
+
+Signers, takes and noise are those of `signface synth` (other heads by 4 to 6 mm RMS, bases stronger, weaker and turned,
+markers misplaced by 1 to 3 mm, jitter of 0.1 to 0.3 mm, gaps), with seeds that nothing else uses.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from signface.corpus.synthesis import Job, make_plan, make_signer, make_take
+from signface.corpus.synthetic_expressions import Spread
+from signface.corpus.synthetic_markers import head_motion, record
+from signface.face.layout import MarkerLayout
+from signface.face.model import FaceModel
+from signface.solve.solving import prepare_take
+from signface.takes.take import Take
+
+RATE = 200.0
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A take brought to the avatar, and the truth.
+
+    Parameters
+    ----------
+    signer : int
+    name : str
+    displacements : dict of str to (F, P, 3) array
+        By the name of the adaptation, millimetres, NaN where a marker is missing.
+    weights : (F, N) array
+        Weights with which the avatar shows what the signer shows.
+    """
+
+    signer: int
+    name: str
+    displacements: dict[str, np.ndarray]
+    weights: np.ndarray
+
+
+def _prepared(signer: int, name: str, take: Take, neutral_s: float, weights: np.ndarray, face, layout) -> Recording:
+    displacements = {
+        adaptation: prepare_take(take, face, layout, neutral=neutral_s, adaptation=adaptation).displacements
+        for adaptation in ("similarity", "rbf")
+    }
+    return Recording(signer, name, displacements, weights)
+
+
+def make_recordings(
+    face: FaceModel, layout: MarkerLayout, *, seed: int, signers: int, takes: int
+) -> tuple[list[Recording], list[Recording]]:
+    """Takes of signers, and of each a range-of-motion take in which every base is shown by itself.
+
+    Returns
+    -------
+    (list of Recording, list of Recording)
+        Takes, and range-of-motion takes.
+    """
+    kinds = [("IE", 0), ("EU", 2), ("SE", 1), ("IE", 4), ("EU", 11), ("EU", 7)]
+    recordings, motions = [], []
+    for signer in range(signers):
+        for step in range(takes):
+            kind, number = kinds[(signer + step) % len(kinds)]
+            job = Job(seed, signer, kind, number)
+            made = make_take(job)
+            recordings.append(
+                _prepared(signer, job.name, made.take, made.neutral_s, made.avatar_weights.weights, face, layout)
+            )
+        motions.append(_range_of_motion(face, layout, seed, signer))
+    return recordings, motions
+
+
+def _range_of_motion(face: FaceModel, layout: MarkerLayout, seed: int, signer: int) -> Recording:
+    """A second of rest, then each base rising to its full strength and falling again within 0.8 s."""
+    who = make_signer(seed, signer, Spread())
+    rng = np.random.default_rng([seed, signer])
+    rest, length = int(RATE), int(0.8 * RATE)
+    weights = np.zeros((rest + length * face.n_bases, face.n_bases))
+    shape = np.sin(np.linspace(0.0, np.pi, length)) ** 2
+    for base in range(face.n_bases):
+        start = rest + base * length
+        weights[start : start + length, base] = shape
+    plan = make_plan(Job(seed, signer, "IE", 0), who.habits)
+    time = np.arange(len(weights)) / RATE
+    poses = head_motion(plan, time, RATE, rng)
+    positions = record(who.head, who.glued, weights, poses, plan, RATE, rng)
+    take = Take(positions, who.glued.labels, RATE, name=f"S{signer + 1}_ROM")
+    return _prepared(signer, take.name, take, 0.5, who.head.avatar_weights(weights), face, layout)
+
+
+def own_face(layout: MarkerLayout, face: FaceModel, weights: np.ndarray, jitter_mm: float, seed: int) -> np.ndarray:
+    """(F, P, 3) displacements of markers on the avatar itself, each jittering by `jitter_mm` RMS in space."""
+    marked = np.tensordot(weights, layout.bases(face), axes=1)
+    return marked + np.random.default_rng(seed).normal(0.0, jitter_mm / np.sqrt(3.0), marked.shape)
