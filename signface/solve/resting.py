@@ -6,8 +6,8 @@ show within their bounds. So each candidate is tried as the neutral frame on som
 taken whose movements the avatar explains best.
 
 On a synthetic corpus of 60 takes (seed 0, on which the constants were chosen) the skin at the chosen frame is 0.23 mm
-RMS from neutral on average and 0.8 mm at worst, on 30 of another signer (seed 5) 0.23 and 0.6 mm; in the longest
-still stretch near the median pose it is 0.38 and 1.9 mm, and 0.31 and 1.4 mm.
+RMS from neutral on average and 0.6 mm at worst, on 30 of another signer (seed 5) 0.24 and 0.6 mm; in the longest still
+stretch near the median pose it is 0.38 and 1.9 mm, and 0.31 and 1.4 mm.
 """
 
 from __future__ import annotations

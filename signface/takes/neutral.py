@@ -20,6 +20,9 @@ from signface.takes.take import Take
 #: Speeds are means over this long, in seconds; a shorter rest is no rest.
 SMOOTHING_S, SHORTEST_S = 0.1, 0.2
 
+#: Speeds up to this many times that of the stillest tenth are the markers' jitter.
+JITTER = 1.3
+
 #: Still stretches whose mean poses are nearer than this (root mean square over the markers, mm) are one pose.
 SAME_POSE_MM = 0.3
 
@@ -52,7 +55,8 @@ def find_neutral(take: Take, labels: Sequence[str] | None = None, *, head: Seque
     """Time of a neutral frame: in the longest still stretch closest to the take's median pose.
 
     A frame's speed is the root mean square speed of its markers. Still stretches are those slower than the slowest
-    third of the take (and at least 0.2 s long). Of these the one with the greatest `duration / (1 + (d / s)^2)` is
+    third of the take, or hardly faster than its stillest tenth (jitter), and at least 0.2 s long. Of these the one
+    with the greatest `duration / (1 + (d / s)^2)` is
     taken, where `d` is the distance of its mean pose from the take's median pose and `s` the smallest such distance
     of any stretch (or 0.5 mm): length counts among stretches that are near the median pose. In it, the frame nearest
     to the stretch's own median pose is the answer.
@@ -162,7 +166,9 @@ def _motion(take: Take, labels: Sequence[str] | None, head: Sequence[str] | None
     if not known.any():
         best = np.nanargmin(away) if np.isfinite(away).any() else np.argmax(usable)
         return _Motion(poses, away, [], float(take.time[best]))
-    still = known & (speed <= np.quantile(speed[known], 1 / 3))
+    tenth, third = np.quantile(speed[known], (0.1, 1 / 3))
+    # Where the face rests most of the time, jitter alone spreads the speeds of rest over much more than a third.
+    still = known & (speed <= max(third, JITTER * tenth))
     stretches = [(int(begin), int(end)) for begin, end in runs(still) if end - begin >= SHORTEST_S * take.rate]
     return _Motion(poses, away, stretches, float(take.time[np.nanargmin(np.where(known, away, np.nan))]))
 
