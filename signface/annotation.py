@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -123,11 +123,8 @@ def write_annotation(
     annotation: Annotation,
     path: str | PathLike[str],
     *,
-    signer: str = "",
-    video: str | PathLike[str] | None = None,
-    date: str | None = None,
     properties: Mapping[str, str] | None = None,
-    replace: bool = False,
+    **options: Any,
 ) -> list[Path]:
     """Write `TAKE.eaf`, its curves and their description for ELAN's timeseries viewer.
 
@@ -136,16 +133,11 @@ def write_annotation(
     annotation : Annotation
     path : path
         The `.eaf`; `TAKE.curves.csv` and `TAKE_tsconf.xml` appear beside it.
-    signer : str
-        Names the tiers (`affect@SIGNER`); empty for a tier `affect`.
-    video : path, optional
-        Film of the take, linked as the EAF's media.
-    date : str, optional
-        The files' date (ISO 8601); now when not given. With a date, the same input gives the same bytes.
     properties : mapping, optional
         What the header of the `.eaf` says besides model, take and residual.
-    replace : bool
-        Overwrite an `.eaf` in which somebody has worked; the old one is kept as a backup.
+    **options
+        `signer`, `video`, `channels`, `doubtful_below`, `template`, `into`, `mapping`, `date`, `replace`: see
+        `signface.elan.output.write_take`.
 
     Returns
     -------
@@ -155,34 +147,20 @@ def write_annotation(
     Raises
     ------
     SignfaceError
-        The `.eaf` exists and is not our own untouched output, or the folder cannot be written.
+        The `.eaf` exists and is not our own untouched output, the mapping does not fit the template, or the folder
+        cannot be written. Nothing is written then.
     """
-    from signface.elan.curves import write_curves, write_tsconf
-    from signface.elan.export import check_writable, write_eaf
+    from signface.elan.output import write_take
 
-    file = Path(path)
-    curves, tsconf = file.with_suffix(".curves.csv"), file.with_name(f"{file.stem}_tsconf.xml")
-    descriptors, segments = annotation.descriptors, annotation.segments
-    check_writable(file, replace=replace)  # before the curves: nothing half written
-    write_curves(descriptors, segments, curves)
-    write_tsconf(curves, tsconf, date=date)
-    residual = median_residual(descriptors)
+    residual = median_residual(annotation.descriptors)
     told = {
         "model": annotation.classifier,
-        "take": descriptors.name,
+        "take": annotation.descriptors.name,
         "residual_mm": "unknown" if residual is None else f"{residual:.2f}",
     }
-    write_eaf(
-        file,
-        segments,
-        signer=signer,
-        video=video,
-        properties={**told, **(properties or {})},
-        linked_files=(curves, tsconf),
-        date=date,
-        replace=replace,
+    return write_take(
+        path, annotation.descriptors, annotation.segments, properties={**told, **(properties or {})}, **options
     )
-    return [file, curves, tsconf]
 
 
 def median_residual(descriptors: Descriptors) -> float | None:

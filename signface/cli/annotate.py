@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from signface.cli.options import add_solve_arguments, output_files, read_face_and_layout
 from signface.cli.progress import progress
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from signface.label.model import TrainedModel
 
 EXAMPLE = """  signface annotate take.c3d -o take.eaf
-  signface annotate recordings/*.c3d -o annotated/ --signer S1"""
+  signface annotate recordings/*.c3d -o annotated/ --signer S1
+  signface annotate take.c3d --into corrected.eaf --channels"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,6 +34,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--signer", default="", metavar="NAME", help="names the tiers: affect@NAME")
     parser.add_argument("--video", type=Path, metavar="FILE", help="film of the take, linked in the .eaf")
+    parser.add_argument(
+        "--into", type=Path, metavar="EAF", help="add our tiers to this .eaf, and touch nothing else in it"
+    )
+    parser.add_argument(
+        "--template", type=Path, metavar="ETF_OR_EAF", help="a lab's template, whose tiers and vocabularies are used"
+    )
+    parser.add_argument(
+        "--mapping", type=Path, metavar="FILE", help="which channel goes to which tier (signface elan map writes one)"
+    )
+    parser.add_argument(
+        "--channels",
+        nargs="?",
+        const="default",
+        metavar="FILE",
+        help="also brows, eyes, gaze, nose, mouth, cheeks, head and intensity; FILE holds other thresholds",
+    )
+    parser.add_argument(
+        "--doubtful",
+        type=float,
+        metavar="CONFIDENCE",
+        help="also a tier with the segments whose confidence is below this, 0 to 1",
+    )
     parser.add_argument(
         "--figure", action="store_true", help="also draw the face and the timeline of each take (TAKE.png)"
     )
@@ -50,13 +73,18 @@ def run(arguments: argparse.Namespace) -> int:
         raise SignfaceError("--video belongs to one take", hint="annotate the takes one by one")
     if arguments.video is not None and not arguments.video.is_file():
         raise SignfaceError("no such video", file=arguments.video)
-    files = output_files(takes, arguments.output, ".eaf")
+    if arguments.into is not None and len(takes) > 1:
+        raise SignfaceError("--into names one file", hint="annotate the takes one by one")
+    if arguments.into is not None and arguments.template is not None:
+        raise SignfaceError("--into and --template exclude each other", hint="the file of --into has its own tiers")
+    files = [arguments.into] if arguments.into is not None else output_files(takes, arguments.output, ".eaf")
+    options = _writing_options(arguments)
     face, layout = read_face_and_layout(arguments)
     model = load_model(arguments.classifier)
     failed = 0
     for take, file in progress(list(zip(takes, files, strict=True)), "annotating"):
         try:
-            annotate_file(take, file, arguments, face=face, layout=layout, model=model)
+            annotate_file(take, file, arguments, options, face=face, layout=layout, model=model)
         except SignfaceError as error:
             if len(takes) == 1:
                 raise
@@ -67,10 +95,30 @@ def run(arguments: argparse.Namespace) -> int:
     return 2 if failed else 0
 
 
+def _writing_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What `signface.elan.output.write_take` is told, read before anything is solved."""
+    from signface.elan.mapping import read_mapping
+    from signface.label.channels import read_channels
+
+    if arguments.doubtful is not None and not 0 <= arguments.doubtful <= 1:
+        raise SignfaceError(f"--doubtful is a confidence from 0 to 1, not {arguments.doubtful:g}")
+    return {
+        "signer": arguments.signer,
+        "video": arguments.video,
+        "channels": None if arguments.channels is None else read_channels(arguments.channels),
+        "doubtful_below": arguments.doubtful,
+        "template": arguments.template,
+        "into": arguments.into,
+        "mapping": None if arguments.mapping is None else read_mapping(arguments.mapping),
+        "replace": arguments.replace,
+    }
+
+
 def annotate_file(
     take: Path,
     file: Path,
     arguments: argparse.Namespace,
+    options: dict[str, Any],
     *,
     face: FaceModel,
     layout: MarkerLayout | None,
@@ -89,7 +137,7 @@ def annotate_file(
         method=arguments.method,
         alpha=arguments.alpha,
     )
-    write_annotation(found, file, signer=arguments.signer, video=arguments.video, replace=arguments.replace)
+    write_annotation(found, file, **options)
     if arguments.figure:
         save_picture(found, face, file.with_suffix(".png"))
     print(f"{file}: {summarise(found)}")
