@@ -233,7 +233,7 @@ def draw(rows: dict[str, dict[str, float]], timed: dict[str, object], path: Path
             name, (micro[name], rows[name]["surface_mm"]), xytext=(7, 4), textcoords="offset points",
             fontsize=9, fontweight="bold" if strong else "normal",
         )  # fmt: skip
-    axes.set(xscale="log", yscale="log", xlabel="microseconds a frame", ylabel="error of the skin, mm RMS")
+    axes.set(xscale="log", xlabel="microseconds a frame", ylabel="error of the skin, mm RMS")
     axes.set_title("Unseen synthetic signers: error and cost of each method", fontsize=11)
     axes.margins(x=0.18, y=0.15)
     axes.grid(alpha=0.3, which="both", lw=0.4)
