@@ -11,7 +11,11 @@ number of jobs.
 
 from __future__ import annotations
 
+import os
+import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
 from typing import TypeVar
 
 from signface.errors import SignfaceError
@@ -21,6 +25,9 @@ Result = TypeVar("Result")
 
 #: How long we wait for a scheduler to answer, seconds.
 PATIENCE_S = 10.0
+
+#: How often a process looks whether the one that started it still lives, seconds.
+WATCH_S = 0.25
 
 
 class WorkerDied(SignfaceError):
@@ -67,7 +74,21 @@ def on_cores(
 
 
 def _numbered(function: Callable[[Job], Result], number: int, job: Job) -> tuple[int, Result]:
+    _leave_with_parent()
     return number, function(job)
+
+
+@lru_cache(maxsize=1)
+def _leave_with_parent() -> None:
+    """Make this process end when the one that started it has been killed: joblib's would wait for minutes for work."""
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(WATCH_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _on_its_own(function: Callable[[Job], Result], job: Job) -> Result | WorkerDied:
