@@ -57,15 +57,14 @@ def draw_overview(
     draw_timeline_on(below, descriptors, segments, reference, title)
     pictures = faces.subplots(1, max(1, len(frames)), squeeze=False)[0]
     for axes, (frame, label) in zip(pictures, frames, strict=False):
-        axes.imshow(draw_face(face, descriptors.weights[frame], size=(420, 460)))
+        axes.imshow(draw_face(face, descriptors.weights[frame], size=(440, 420)))
         axes.set_xlabel(f"{descriptors.time[frame]:.2f} s: {AFFECTS.get(label, label)}", fontsize=10)
         axes.set_xticks([])
         axes.set_yticks([])
         for spine in axes.spines.values():
             spine.set(color=colour_of(label), linewidth=3)
-    for axes in below.axes:
-        for frame, _ in frames:
-            axes.axvline(descriptors.time[frame], color="#303030", lw=0.8, ls=":")
+    for frame, _ in frames:
+        below.axes[0].axvline(descriptors.time[frame], color="#303030", lw=0.8, ls=":", zorder=0)
     return figure
 
 
