@@ -6,6 +6,8 @@
 
 from __future__ import annotations
 
+import weakref
+
 import numpy as np
 from scipy import sparse
 
@@ -14,6 +16,9 @@ from signface.face.model import FaceModel
 
 #: The scale at which bending is measured, as a share of the square root of the skin's area: 7 mm on the default face.
 RESOLUTION = 0.02
+
+#: What was computed for faces that are still in use: several solvers are made for one face. A face does not change.
+_KNOWN: dict[int, tuple[weakref.ref[FaceModel], tuple[np.ndarray, np.ndarray]]] = {}
 
 
 def stiffness_and_mass(mesh: Mesh) -> tuple[sparse.csr_matrix, np.ndarray]:
@@ -60,6 +65,15 @@ def thin_shell_matrices(face: FaceModel) -> tuple[np.ndarray, np.ndarray]:
     bending : (N, N) array
         `b_i' S (M + h^2 S)^-1 S b_j`, without unit; positive semidefinite.
     """
+    known = _KNOWN.get(id(face))
+    if known is not None and known[0]() is face:
+        return known[1]
+    matrices = _thin_shell_matrices(face)
+    _KNOWN[id(face)] = weakref.ref(face, lambda _, key=id(face): _KNOWN.pop(key, None)), matrices
+    return matrices
+
+
+def _thin_shell_matrices(face: FaceModel) -> tuple[np.ndarray, np.ndarray]:
     from scipy.sparse.linalg import splu
 
     stiffness, mass = stiffness_and_mass(face.mesh)
@@ -67,9 +81,16 @@ def thin_shell_matrices(face: FaceModel) -> tuple[np.ndarray, np.ndarray]:
     columns = face.bases.transpose(1, 0, 2).reshape(vertices, 3 * count)
     stiff = stiffness @ columns
     smoothing = sparse.diags(mass) + RESOLUTION**2 * mass.sum() * stiffness
-    smooth = splu(smoothing.tocsc()).solve(stiff)
-    stretching, bending = (
-        np.tensordot(left.reshape(vertices, count, 3), right.reshape(vertices, count, 3), axes=((0, 2), (0, 2)))
-        for left, right in ((columns, stiff), (stiff, smooth))
-    )
-    return 0.5 * (stretching + stretching.T), 0.5 * (bending + bending.T)
+    smoothing = smoothing.tocsc()
+    # Symmetric and positive definite: an ordering made for that keeps the factors sparse.
+    factors = splu(smoothing, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    smooth = factors.solve(np.asfortranarray(stiff))
+    by_base = [
+        np.ascontiguousarray(values.reshape(vertices, count, 3).transpose(1, 0, 2)).reshape(count, -1)
+        for values in (columns, stiff, smooth)
+    ]
+    stretching, bending = by_base[0] @ by_base[1].T, by_base[1] @ by_base[2].T
+    result = 0.5 * (stretching + stretching.T), 0.5 * (bending + bending.T)
+    for matrix in result:
+        matrix.setflags(write=False)
+    return result

@@ -149,7 +149,8 @@ class MarkerBases:
                 f" the {columns.shape[1]} bases of {self.face_name} that move them",
                 hint=f"use at least {-(-columns.shape[1] // 3)} face markers",
             )
-        _, values, rows = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
+        # R of a QR factorisation has the singular values and rows of the many rows it stands for.
+        _, values, rows = np.linalg.svd(np.linalg.qr(columns / np.linalg.norm(columns, axis=0), mode="r"))
         null = rows[values < DEPENDENT * values[0]]
         if len(null):
             share = np.abs(null).max(axis=0)
