@@ -142,7 +142,7 @@ def on_cluster(
             ) from error
         futures = client.map(function, jobs, pure=False, batch_size=100)
         which = {future.key: job for future, job in zip(futures, jobs, strict=True)}
-        for future in as_completed(futures):
+        for future in as_completed(futures, loop=client.loop):
             try:
                 result = future.result()
             except KilledWorker:
