@@ -68,8 +68,12 @@ def thin_shell_matrices(face: FaceModel) -> tuple[np.ndarray, np.ndarray]:
     known = _KNOWN.get(id(face))
     if known is not None and known[0]() is face:
         return known[1]
-    matrices = _thin_shell_matrices(face)
-    _KNOWN[id(face)] = weakref.ref(face, lambda _, key=id(face): _KNOWN.pop(key, None)), matrices
+    matrices, key = _thin_shell_matrices(face), id(face)
+
+    def forget(_: weakref.ref[FaceModel]) -> None:
+        _KNOWN.pop(key, None)
+
+    _KNOWN[key] = weakref.ref(face, forget), matrices
     return matrices
 
 
