@@ -3,7 +3,7 @@
 - `Recipe`: how a corpus is solved; face, layout, method, alpha, and the solver itself.
 - `Origin`: the recipe, one recording and its row of `takes.csv`; its `key` is what the store compares.
 - `make_recipe`, `find_origin`: read the files and make them.
-- `content_digest`, `code_digest`: of files and folders, and of our own modules.
+- `content_digest`, `shipped_digest`, `code_digest`: of files and folders, of shipped data, of our own modules.
 - `take_name`: the name of a take within its corpus.
 
 Descriptors are asked for by content, never by date or by name: a recording that is exported again, a layout with one
@@ -123,12 +123,12 @@ def make_recipe(
     >>> make_recipe("default", "default-40").name  # doctest: +SKIP
     'default-5f0c1e2ab4'
     """
-    layouts = shipped("layouts", ".csv")
     if layout is None:
+        layouts = shipped("layouts", ".csv")
         layout_digest = _digest_of([[name, content_digest(file)] for name, file in layouts.items()])
     else:
-        layout_digest = content_digest(layouts.get(layout, Path(layout)))
-    face_digest = content_digest(shipped("faces", ".glb").get(face, Path(face)))
+        layout_digest = shipped_digest("layouts", ".csv", layout)
+    face_digest = shipped_digest("faces", ".glb", face)
     return Recipe(face, layout, method, alpha, face_digest, layout_digest, code_digest(*SOLVING_CODE))
 
 
@@ -198,6 +198,22 @@ def content_digest(path: Path) -> str:
         raise SignfaceError("no such file", file=path) from error
     except OSError as error:
         raise SignfaceError(f"cannot be read ({error.strerror})", file=path) from error
+
+
+def shipped_digest(kind: str, suffix: str, name: str) -> str:
+    """SHA-256 of shipped data (`signface.files.shipped`) by its name, or of a file or folder by its path.
+
+    Raises
+    ------
+    SignfaceError
+        There is nothing of that name.
+    """
+    ours = shipped(kind, suffix)
+    path = ours.get(name, Path(name))
+    if not path.exists():
+        one = kind.removesuffix("s")
+        raise SignfaceError(f"no such {one}", file=path, hint=f"name a file or a shipped {one}: {', '.join(ours)}")
+    return content_digest(path)
 
 
 @lru_cache

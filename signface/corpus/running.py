@@ -33,14 +33,14 @@ from signface.corpus.origin import (
     SOLVING_CODE,
     Recipe,
     code_digest,
-    content_digest,
     find_origin,
     make_recipe,
+    shipped_digest,
     take_name,
 )
 from signface.corpus.store import DescriptorStore
 from signface.errors import SignfaceError
-from signface.files import shipped, whole_file
+from signface.files import whole_file
 
 if TYPE_CHECKING:
     from signface.label.model import TrainedModel
@@ -199,7 +199,7 @@ def plan_jobs(corpus: Corpus, output: Path, recipe: Recipe, *, classifier: str) 
     SignfaceError
         Two takes would be written to the same file, or there is no such classifier.
     """
-    model, code = model_digest(classifier), code_digest(*ANNOTATING_CODE)
+    model, code = shipped_digest("classifiers", ".skops", classifier), code_digest(*ANNOTATING_CODE)
     folder = Path(os.path.abspath(corpus.folder))
     known: dict[tuple[str, str | None], Recipe] = {}
     jobs: dict[str, Job] = {}
@@ -343,14 +343,9 @@ def _model(classifier: str, digest: str) -> TrainedModel:
     """A classifier whose content is the one that was asked for."""
     from signface.label.persistence import load_model
 
-    if model_digest(classifier) != digest:
+    if shipped_digest("classifiers", ".skops", classifier) != digest:
         raise SignfaceError("is not the classifier that the run began with", file=classifier, hint="run again")
     return load_model(classifier)
-
-
-def model_digest(classifier: str) -> str:
-    """SHA-256 of the file of a classifier, a shipped name or a path."""
-    return content_digest(shipped("classifiers", ".skops").get(classifier, Path(classifier)))
 
 
 def _absolute(entry: TakeEntry) -> TakeEntry:
