@@ -72,7 +72,10 @@ def postgresql() -> Iterator[str]:
         port = free_port()
         command = [*as_user, str(folder / "postgres"), "-D", str(data), "-p", str(port), "-k", name]
         process = subprocess.Popen(
-            [*command, "-c", "listen_addresses=127.0.0.1"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=name
+            [*command, "-c", "listen_addresses=127.0.0.1"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            cwd=name,
         )
         url = f"postgresql://signface@127.0.0.1:{port}/postgres"
         try:

@@ -188,4 +188,3 @@ class Browser:
             self.go_on()
             count += 1
         return count
-

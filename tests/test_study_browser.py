@@ -33,8 +33,11 @@ def new_browser():
     opened = []
     with tempfile.TemporaryDirectory(prefix="signface-chromium-") as profiles:
 
-        def make(width=1100, height=900):
+        def make(telephone=False):
             options = webdriver.ChromeOptions()
+            if telephone:
+                screen = {"width": 390, "height": 844, "pixelRatio": 2}
+                options.add_experimental_option("mobileEmulation", {"deviceMetrics": screen})
             options.binary_location = CHROMIUM
             flags = (
                 "headless",
@@ -46,9 +49,9 @@ def new_browser():
                 "disable-background-networking",
                 "disable-component-update",
                 "disable-sync",
-                "lang=fr",
+                "accept-lang=fr",
                 f"user-data-dir={profiles}/{len(opened)}",
-                f"window-size={width},{height}",
+                "window-size=1100,900",
             )
             for flag in flags:
                 options.add_argument(f"--{flag}")
@@ -126,7 +129,9 @@ def test_a_browser_takes_a_questionnaire_of_the_thesis(new_browser, tmp_path, na
         wait.until(lambda b: all(state >= 2 and error is None for state, error in b.execute_script(plays)))
         assert len(browser.execute_script(plays)) == (2 if name == "group-2b" else 1)
         browser.find_element("css selector", "button.play").click()
-        wait.until(lambda b: b.execute_script("return [...document.querySelectorAll('video')].every(v => v.played.length)"))
+        wait.until(
+            lambda b: b.execute_script("return [...document.querySelectorAll('video')].every(v => v.played.length)")
+        )
         assert go_through(browser) == films
         keep(browser, f"{name}-thanks")
         assert wrong_in_console(browser) == []
@@ -150,11 +155,11 @@ def test_a_browser_resumes_in_the_middle_on_a_telephone(new_browser, tmp_path):
         link = first.find_element("css selector", "a.private").text
         assert link.startswith(address)
         keep(first, "resume-link")
-        second = new_browser(412, 915)
+        second = new_browser(telephone=True)
         second.get(link)
         assert path_of(second) == place
         keep(second, "telephone-film")
-        wide = "return document.documentElement.scrollWidth <= window.innerWidth"
+        wide = "return document.documentElement.scrollWidth <= document.documentElement.clientWidth"
         assert second.execute_script(wide), "the page is wider than a telephone"
         small = (
             "return [...document.querySelectorAll('main label:has(input), main button:not([hidden]), main a.button')]"
@@ -186,8 +191,8 @@ def test_a_page_is_answered_with_the_keyboard_alone(new_browser, tmp_path):
             active = browser.switch_to.active_element
             reached.append((active.tag_name, active.get_attribute("name") or active.get_attribute("type") or ""))
             if active.get_attribute("name") == "answer_fidelity":
-                active.send_keys(Keys.ARROW_RIGHT)
-                active.send_keys(Keys.ARROW_RIGHT)
+                active.send_keys(Keys.ARROW_RIGHT)  # from the first, which is not chosen yet, to the second
+                browser.switch_to.active_element.send_keys(Keys.ARROW_RIGHT)
             if active.tag_name == "button" and active.get_attribute("type") == "submit":
                 keep(browser, "keyboard")
                 active.send_keys(Keys.ENTER)

@@ -29,7 +29,9 @@ def test_sqlite_keeps_a_log_and_waits_for_the_disk(tmp_path):
 
     store = open_store(tmp_path / "answers.sqlite")
     with store._engine.connect() as connection:
-        values = [connection.execute(sqlalchemy.text(f"PRAGMA {name}")).scalar() for name in ("journal_mode", "synchronous")]
+        values = [
+            connection.execute(sqlalchemy.text(f"PRAGMA {name}")).scalar() for name in ("journal_mode", "synchronous")
+        ]
     assert values == ["wal", 2]
     store.close()
 
@@ -48,7 +50,9 @@ def test_a_server_that_is_killed_loses_no_acknowledged_answer(tmp_path):
                 while not stop.is_set():
                     value = value % 7 + 1
                     browser.get(path)
-                    answer = browser.send({**browser.fill(), "answer_intensity": str(value), "answer_comment": f"{value}"})
+                    answer = browser.send(
+                        {**browser.fill(), "answer_intensity": str(value), "answer_comment": f"{value}"}
+                    )
                     if answer.status_code == 200:
                         acknowledged.append((token, value))
             except (httpx.HTTPError, AssertionError):

@@ -34,7 +34,9 @@ def site(tmp_path):
         ("group-2b", 36, {"LSTS30", "LS"}),
     ],
 )
-def test_a_questionnaire_of_the_thesis_goes_from_consent_to_an_export_that_analyse_reads(tmp_path, name, films, methods):
+def test_a_questionnaire_of_the_thesis_goes_from_consent_to_an_export_that_analyse_reads(
+    tmp_path, name, films, methods
+):
     site = Site(tmp_path, shipped_study(name, tmp_path))
     browser = site.browser()
     browser.agree()

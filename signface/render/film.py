@@ -280,7 +280,9 @@ def read_film(
     try:
         next(reader)
     except (OSError, StopIteration, RuntimeError) as error:
-        raise SignfaceError("cannot be read as a video", file=path, hint="ffmpeg must be able to play it") from error
+        raise SignfaceError(
+            f"cannot be read as a video from {start_s:g} s on", file=path, hint="is it long enough, and does it play"
+        ) from error
     try:
         for frame in reader:
             yield np.frombuffer(frame, np.uint8).reshape(height, width, 3)

@@ -230,7 +230,7 @@ class Questionnaire:
             self._page(participant, index)
             return self._show(participant, token, index, page, fields, mistakes, 422)
         self.store.answer(participant, page.block, page.key, {c: value or "" for c, (value, _) in checked.items()})
-        return self._to(f"/page/{index + 2}" if index + 1 < self.turn(participant) else "/next")
+        return self._to(f"/page/{index + 2}")
 
     def thanks(self, request: Request) -> Response:
         """The end."""
@@ -482,6 +482,7 @@ def serve(study: Study, store: Store, *, host: str = "127.0.0.1", port: int = 80
         log_level="warning",
         access_log=False,  # it would hold addresses and private links
         server_header=False,
+        timeout_keep_alive=75,  # longer than a film is looked at, so that an answer needs no new connection
         proxy_headers=behind_proxy,
         forwarded_allow_ips="127.0.0.1",
     )

@@ -10,9 +10,11 @@ participant's place. No address, no browser and no name is stored.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import secrets
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from os import PathLike
@@ -180,6 +182,7 @@ class Store:
         self._metadata, self._tables = _tables(sqlalchemy)
         dialect = engine.dialect.name
         self._insert = getattr(sqlalchemy.dialects, dialect).insert  # both know ON CONFLICT
+        self._writer: Any = threading.Lock() if dialect == "sqlite" else contextlib.nullcontext()
         self._lock_row = dialect != "sqlite"  # SQLite locks the whole file when a writing transaction begins
 
     def create(self) -> None:
@@ -191,8 +194,11 @@ class Store:
         """Let go of every connection."""
         self._engine.dispose()
 
-    def _writing(self) -> Any:
-        return self._engine.execution_options(writes=True).begin()
+    @contextlib.contextmanager
+    def _writing(self) -> Iterator[Any]:
+        """A transaction that changes something. SQLite has one writer: our threads queue for it, others ask again."""
+        with self._writer, self._engine.execution_options(writes=True).begin() as connection:
+            yield connection
 
     # ---- settings
 

@@ -12,20 +12,18 @@ window.addEventListener("pageshow", () => {
   for (const form of document.forms) delete form.dataset.sent;
 });
 
-// A play button; two films play together.
+// A play button: two films play together, and no control lies over a face.
 const films = [...document.querySelectorAll("form video")];
 const play = document.querySelector("button.play");
 if (play && films.length) {
   play.hidden = false;
+  for (const film of films) film.controls = false;
   play.addEventListener("click", () => {
     for (const film of films) {
       film.currentTime = 0;
       film.play();
     }
   });
-  if (films.length === 2) {
-    for (const film of films) film.controls = false;
-  }
 }
 
 // A private link is shown whole, so that it can be copied.
