@@ -79,14 +79,14 @@ class Material:
     @cached_property
     def rows(self) -> np.ndarray:
         """The trajectories to cluster."""
-        moving = self.sites.moving
+        own = self.sites.clustered
         mirror = None
         if self.rules.symmetric:
             place = np.full(len(self.face.mesh.vertices), -1)
-            place[moving] = np.arange(len(moving))
-            mirror = place[self.sites.mirror[moving]]
-            mirror = np.where(mirror < 0, np.arange(len(moving)), mirror)
-        return trajectories([skin[:, moving] for skin in self.skins], mirror)
+            place[own] = np.arange(len(own))
+            mirror = place[self.sites.mirror[own]]
+            mirror = np.where(mirror < 0, np.arange(len(own)), mirror)
+        return trajectories([skin[:, own] for skin in self.skins], mirror)
 
     @cached_property
     def _shell(self) -> ThinShell:

@@ -38,7 +38,7 @@ class Clusters:
     markers : tuple of int
         Vertices.
     members : (K,) int array
-        For each moving vertex, the position in `markers` of the marker that stands for it.
+        For each clustered vertex, the position in `markers` of the marker that stands for it.
     """
 
     markers: tuple[int, ...]
@@ -94,7 +94,7 @@ def cluster_markers(rows: np.ndarray, sites: Sites, count: int, *, seed: int = 0
     Parameters
     ----------
     rows : (K, D) array
-        From `trajectories`, in the order of `sites.moving`.
+        From `trajectories`, in the order of `sites.clustered`.
     sites : Sites
     count : int
     seed : int
@@ -107,7 +107,13 @@ def cluster_markers(rows: np.ndarray, sites: Sites, count: int, *, seed: int = 0
     from sklearn.cluster import KMeans
 
     board = Board(sites, count)
-    where = {int(vertex): row for row, vertex in enumerate(sites.moving)}
+    where = {int(vertex): row for row, vertex in enumerate(sites.clustered)}
+    hidden = [vertex for vertex in sites.rules.fixed if vertex not in where]
+    if hidden:
+        raise SignfaceError(
+            f"the fixed marker on vertex {hidden[0]} stands below the jaw or hidden, where nothing is clustered",
+            hint="choose another method than k-means, or leave it out",
+        )
     own = np.array([where[int(group[-1] if sites.vertices[group[-1], 0] > 0 else group[0])] for group in sites.groups])
     if not sites.rules.symmetric:
         found = KMeans(count, n_init=STARTS, random_state=seed).fit(rows)
@@ -115,7 +121,7 @@ def cluster_markers(rows: np.ndarray, sites: Sites, count: int, *, seed: int = 0
         _place(board, rows, own, found, _others(found.cluster_centers_, fixed))
         return Clusters(tuple(board.chosen), _nearest(rows, rows[[where[v] for v in board.chosen]]))
 
-    across = sites.vertices[sites.moving, 0]
+    across = sites.vertices[sites.clustered, 0]
     half = np.flatnonzero(across > -MIDDLE_MM / 2)
     given = {max(v, int(sites.mirror[v]), key=lambda vertex: sites.vertices[vertex, 0]) for v in sites.rules.fixed}
     fixed = rows[[where[vertex] for vertex in sorted(given)]]

@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 from signface.errors import SignfaceError
 from signface.face.model import FaceModel
 from signface.placement.empirical import find_landmarks
+from signface.render.still import face_camera, fragments, whole_mesh
 
 #: Zones where no marker holds, and how far around their lines (mm).
 ZONES = {
@@ -29,6 +30,8 @@ _LIDS_MM, _LIPS_MM, _NOSTRIL_MM = 4.0, 4.0, 3.0
 MIDLINE_MM = 0.5
 #: A vertex has a mirror image when one lies this near (mm).
 MIRROR_MM = 2.0
+#: Pictures on which it is found out what cameras see, width and height in pixels.
+_VIEW = (400, 480)
 #: Sites closer than this need not both be tried (mm); no one glues a marker that precisely.
 GRAIN_MM = 2.5
 
@@ -75,8 +78,11 @@ class Sites:
         Vertices that are chosen together: one, or a pair of mirror images.
     vertices : (V', 3) array
         Positions of all vertices of the face, millimetres.
-    moving : (K,) int array
-        Vertices that some base moves, allowed or not: what is clustered.
+    moving : (K',) int array
+        Vertices that some base moves, allowed or not.
+    clustered : (K,) int array
+        Those of them that belong to the face: seen, and not below the jaw where that is forbidden. Clusters on the neck
+        would take markers that must stand elsewhere.
     mirror : (V',) int array
         Mirror image of each vertex, -1 where it has none.
     rules : Rules
@@ -85,6 +91,7 @@ class Sites:
     groups: tuple[np.ndarray, ...]
     vertices: np.ndarray
     moving: np.ndarray
+    clustered: np.ndarray
     mirror: np.ndarray
     rules: Rules = field(default_factory=Rules)
 
@@ -153,6 +160,8 @@ class Board:
     def free(self) -> np.ndarray:
         """(S,) bool: the sites that may be chosen next.
 
+        With pairs, the number still left must come out even: the last places on the midline are kept for that.
+
         Raises
         ------
         SignfaceError
@@ -165,6 +174,12 @@ class Board:
                 f" {self.sites.rules.apart_mm:g} mm apart where they are allowed",
                 hint="ask for fewer markers, a smaller least distance, or forbid less",
             )
+        single = fits & (self._size == 1)
+        if single.sum() <= 2 and not single[fits].all():
+            if self.left % 2 and single.any():
+                return single
+            if self.left % 2 == 0 and single.sum() == 1:
+                return fits & ~single
         return fits
 
     def take(self, site: int) -> None:
@@ -209,7 +224,10 @@ def find_sites(face: FaceModel, rules: Rules | None = None) -> Sites:
             f"the fixed marker on vertex {still[0]} stands where no base moves the skin",
             hint="give it the role head, or leave it out",
         )
-    allowed = moving[~forbidden(face, rules)[moving]]
+    seen = seen_skin(face)
+    allowed = moving[(seen & ~forbidden(face, rules))[moving]]
+    neck = forbidden(face, Rules(forbidden=tuple(zone for zone in rules.forbidden if zone == "under-jaw")))
+    clustered = moving[(seen & ~neck)[moving]]
     distance, mirror = cKDTree(vertices).query(vertices * (-1.0, 1.0, 1.0))
     mirror = np.where(distance < MIRROR_MM, mirror, -1)
     mirror[np.abs(vertices[:, 0]) < MIDLINE_MM] = np.flatnonzero(np.abs(vertices[:, 0]) < MIDLINE_MM)
@@ -228,7 +246,7 @@ def find_sites(face: FaceModel, rules: Rules | None = None) -> Sites:
         groups = [np.array([vertex]) for vertex in _thinned(vertices, allowed)]
     if not groups:
         raise SignfaceError("the forbidden zones leave no place for a marker", hint="forbid less")
-    return Sites(tuple(groups), vertices, moving, mirror, rules)
+    return Sites(tuple(groups), vertices, moving, clustered, mirror, rules)
 
 
 def _thinned(vertices: np.ndarray, some: np.ndarray) -> np.ndarray:
@@ -240,6 +258,23 @@ def _thinned(vertices: np.ndarray, some: np.ndarray) -> np.ndarray:
         if not kept or np.linalg.norm(vertices[kept] - vertices[vertex], axis=1).min() >= GRAIN_MM:
             kept.append(int(vertex))
     return np.array(kept, dtype=np.int64)
+
+
+def seen_skin(face: FaceModel) -> np.ndarray:
+    """(V,) bool: the vertices that cameras around the face see at rest.
+
+    What lies in the sockets, behind the lips or in the nostrils moves too, but carries no marker.
+    """
+    seen = np.zeros(len(face.mesh.vertices), dtype=bool)
+    mesh, _ = whole_mesh(face)
+    for yaw, pitch in ((0.0, 0.0), (-60.0, 0.0), (60.0, 0.0), (0.0, -25.0)):
+        camera = face_camera(face, yaw=yaw, pitch=pitch, size=_VIEW, margin=1.1)
+        _, triangles, _ = fragments(camera.project(mesh.vertices)[mesh.triangles], *_VIEW)
+        corners = mesh.triangles[np.unique(triangles)]
+        facing = mesh.triangle_normals[np.unique(triangles)] @ camera.axes[2] > 0.0
+        corners = corners[facing].ravel()
+        seen[corners[corners < len(seen)]] = True
+    return seen
 
 
 def forbidden(face: FaceModel, rules: Rules) -> np.ndarray:

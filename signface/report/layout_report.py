@@ -111,14 +111,14 @@ def paint_errors(
 
 
 def paint_clusters(
-    face: FaceModel, moving: np.ndarray, members: Mapping[str, np.ndarray], points: Mapping[str, np.ndarray]
+    face: FaceModel, clustered: np.ndarray, members: Mapping[str, np.ndarray], points: Mapping[str, np.ndarray]
 ) -> Figure:
     """Faces coloured by cluster, neighbours apart in hue, with the markers.
 
     Parameters
     ----------
     face : FaceModel
-    moving : (K,) int array
+    clustered : (K,) int array
         The vertices that are clustered.
     members : mapping
         Title to the (K,) clusters.
@@ -135,7 +135,7 @@ def paint_clusters(
     for own, (name, cluster) in zip(axes, members.items()):
         hue = (cluster * 0.61803398875) % 1.0  # the golden section keeps successive hues apart
         colours = np.full((len(face.mesh.vertices), 3), 0.8)
-        colours[moving] = hsv_to_rgb(np.stack([hue, np.full(len(hue), 0.55), np.full(len(hue), 0.95)], axis=1))
+        colours[clustered] = hsv_to_rgb(np.stack([hue, np.full(len(hue), 0.55), np.full(len(hue), 0.95)], axis=1))
         _show(own, face, camera, colours, points[name], size)
         own.set_title(name, fontsize=10)
     return figure

@@ -94,7 +94,7 @@ def _clusters(plan: Plan, face: FaceModel, material: Material):  # type: ignore[
     found = {name: own.clusters(count, seed=plan.seed) for name, own in several.items()}
     return paint_clusters(
         face,
-        material.sites.moving,
+        material.sites.clustered,
         {f"{count} clusters, {name}": own.members for name, own in found.items()},
         {f"{count} clusters, {name}": face.mesh.vertices[list(own.markers)] for name, own in found.items()},
     )
