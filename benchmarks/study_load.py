@@ -91,7 +91,7 @@ async def run_load(address: str, participants: int, *, arrive_s: float, look_s: 
 
 
 def check_nothing_is_lost(load: Load, database: str | Path) -> tuple[int, int]:
-    """(lost, extra): acknowledged answers that the database does not hold with that value, and those it holds besides."""
+    """(lost, extra): acknowledged answers that the database does not hold so, and those that it holds besides."""
     from signface.study.design import read_study
     from signface.study.questionnaire import pages_of
     from signface.study.store import open_store
@@ -137,9 +137,7 @@ def main() -> None:
             took = time.perf_counter() - began
         lost, extra = check_nothing_is_lost(load, arguments.database or folder / "answers.sqlite")
     waits = np.array(load.waits) * 1000
-    print(
-        f"{load.finished} of {arguments.participants} participants finished, {len(load.errors)} errors {load.errors[:3]}"
-    )
+    print(f"{load.finished} of {arguments.participants} participants finished; errors: {load.errors[:3] or 'none'}")
     print(
         f"{len(waits)} forms in {took:.1f} s; {len(load.acknowledged)} answers acknowledged, {lost} lost, {extra} extra"
     )
