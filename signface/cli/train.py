@@ -8,7 +8,7 @@ from pathlib import Path
 from signface.cli.options import add_face_arguments
 from signface.cli.progress import progress
 from signface.errors import SignfaceError
-from signface.label.labellers import NAMES
+from signface.label.labellers import NAMES, SEQUENCE_NAMES
 
 EXAMPLE = """  signface train corpora/feel -o mine.skops
   signface train corpora/feel -o mine.skops --classifier svm-rbf --kinds IE,SE --signer each"""
@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Fill the parser of this command."""
     parser.add_argument("corpus", type=Path, metavar="CORPUS", help="folder of a corpus")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="MODEL", help="a .skops file")
-    parser.add_argument("--classifier", default="forest", choices=NAMES, help="default: %(default)s")
+    parser.add_argument("--classifier", default="forest", choices=NAMES | SEQUENCE_NAMES, help="default: %(default)s")
     parser.add_argument("--kinds", type=words, metavar="IE,SE", help="kinds of takes to train on (default: all)")
     parser.add_argument(
         "--signer",

@@ -15,14 +15,14 @@ import pandas as pd
 
 from signface.errors import SignfaceError
 from signface.evaluate.classification import accuracy_interval, classification_metrics
-from signface.evaluate.segmentation import segmentation_metrics, value_at
+from signface.evaluate.segmentation import segmentation_metrics
 from signface.label.labellers import NAMES
 from signface.label.labelling import label_segments, label_spans
 from signface.label.model import TrainedModel
 from signface.label.training import Example, train_model
 from signface.label.vocabulary import AFFECTS
 from signface.segment.segmentation import segment
-from signface.segment.segments import Segments
+from signface.segment.segments import Segments, value_at
 
 #: name: which takes train the classifier that a signer's test takes are given to.
 PROTOCOLS = {

@@ -16,6 +16,8 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
+from signface.segment.segments import value_at
+
 #: Tolerances at which boundaries are compared (s).
 TOLERANCES_S = (0.05, 0.10, 0.20)
 
@@ -142,20 +144,3 @@ def _agreeing_time(reference: pd.DataFrame, found: pd.DataFrame) -> tuple[float,
     middles, lengths = (marks[1:] + marks[:-1]) / 2, np.diff(marks)
     same = value_at(reference, "kind", middles) == value_at(found, "kind", middles)
     return float(lengths[same].sum()), float(lengths.sum())
-
-
-def value_at(table: pd.DataFrame, column: str, times: np.ndarray) -> np.ndarray:
-    """(K,) value of a column of a table of segments at some times; an empty string where no segment is.
-
-    Parameters
-    ----------
-    table : DataFrame
-        `start_s`, `end_s` and the column, in time order, without overlap.
-    column : str
-    times : (K,) array of seconds
-    """
-    if table.empty:
-        return np.full(len(times), "", dtype=object)
-    row = np.searchsorted(table["start_s"].to_numpy(float), times, side="right") - 1
-    inside = (row >= 0) & (times < table["end_s"].to_numpy(float)[row.clip(0)])
-    return np.where(inside, table[column].to_numpy(object)[row.clip(0)], "")

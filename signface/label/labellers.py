@@ -1,6 +1,6 @@
-"""The classifiers of the thesis (4.4.3) as scikit-learn estimators.
+"""The classifiers of the thesis (4.4.3) as scikit-learn estimators, and the names of all there are.
 
-- `NAMES`: what there is to choose from.
+- `NAMES`: those of the thesis; `SEQUENCE_NAMES`: the models that know time (`signface.label.sequence`).
 - `make_labeller`: a new, untrained one.
 """
 
@@ -20,6 +20,13 @@ NAMES = {
     "svm-linear": "support vector machine, linear kernel",
     "svm-rbf": "support vector machine, Gaussian kernel",
     "forest": "random forest",
+}
+
+#: Sequence models, which find borders and labels at once. name: what it is.
+SEQUENCE_NAMES = {
+    "net-hsmm": "neural network on frames, decoded by a hidden semi-Markov model",
+    "forest-viterbi": "random forest on frames, decoded by Viterbi's algorithm through a transition state",
+    "hmm": "hidden Markov model with Gaussian frames",
 }
 
 
@@ -64,4 +71,6 @@ def make_labeller(name: str, *, seed: int = 0) -> BaseEstimator:
         from sklearn.ensemble import RandomForestClassifier
 
         return RandomForestClassifier(n_estimators=150, max_depth=12, min_samples_leaf=3, random_state=seed)
-    raise SignfaceError(f"there is no classifier named {name}", hint=f"choose one of {', '.join(NAMES)}")
+    raise SignfaceError(
+        f"there is no classifier named {name}", hint=f"choose one of {', '.join(NAMES | SEQUENCE_NAMES)}"
+    )

@@ -3,19 +3,22 @@
 - `segment_means`: the mean descriptor of each segment (eq. 4.6).
 - `label_spans`: a label and a confidence for any stretches of a take, each for itself.
 - `label_segments`: the segments of a take with labels, transitions included.
+- `find_segments`: a take's segments and their labels by whatever the model is, from nothing but the take.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
-from signface.label.model import TrainedModel
+from signface.label.model import TrainedModel, on_bases
 from signface.label.vocabulary import join
+from signface.segment.segmentation import segment
 from signface.segment.segments import Segments
 
 #: Frames per second that the confidence of a segment is averaged over.
@@ -60,6 +63,8 @@ def label_spans(descriptors: Descriptors, spans: np.ndarray, model: TrainedModel
     """
     if len(spans) == 0:
         return [], []
+    if model.sequential:
+        return _most_likely(descriptors, spans, model)
     columns = model.columns(descriptors)
     means = segment_means(descriptors, spans)[:, columns]
     seen = np.isfinite(means).all(axis=1)
@@ -125,6 +130,41 @@ def label_segments(descriptors: Descriptors, segments: Segments, model: TrainedM
     ]
     table = _table(_without_repetition(states))
     return segments.changed(f"label {model.name} ({model.card.classifier})", table)
+
+
+def find_segments(descriptors: Descriptors, model: TrainedModel) -> Segments:
+    """The labelled segments of a take.
+
+    A sequence model finds them itself; for the others the take is cut by `signface.segment.segmentation.segment` and
+    labelled by `label_segments`. The columns are the same, and neighbours have unequal labels.
+
+    Raises
+    ------
+    SignfaceError
+        The model was trained on other bases, or no frame has weights.
+    """
+    if not model.sequential:
+        return label_segments(descriptors, segment(descriptors), model)
+    model.columns(descriptors)  # raises where bases are missing
+    found = model.estimator.annotate(on_bases(descriptors, model.card.bases))  # type: ignore[attr-defined]
+    return found.changed(f"find_segments {model.name} ({model.card.classifier})", found.table)
+
+
+def _most_likely(descriptors: Descriptors, spans: np.ndarray, model: TrainedModel) -> tuple[list[str], list[float]]:
+    """What a sequence model's frames say of each span: the label with the highest mean log probability."""
+    model.columns(descriptors)
+    take = on_bases(descriptors, model.card.bases)
+    estimator: Any = model.estimator
+    among, times = estimator.label_probabilities(take), estimator.frame_times(take)
+    labels, confidences = [], []
+    for start, end in spans:
+        inside = (times >= start) & (times < end)
+        if not inside.any():
+            inside[np.argmin(np.abs(times - (start + end) / 2))] = True
+        code = int(np.log(among[inside].clip(1e-3)).mean(axis=0).argmax())
+        labels.append(model.card.labels[code])
+        confidences.append(float(among[inside, code].mean()))
+    return labels, confidences
 
 
 @dataclass(frozen=True)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
+from signface.label.labellers import SEQUENCE_NAMES
 
 if TYPE_CHECKING:
     from sklearn.base import ClassifierMixin
@@ -22,7 +23,7 @@ class Card:
     Parameters
     ----------
     classifier : str
-        A name of `signface.label.labellers.NAMES`.
+        A name of `signface.label.labellers`.
     bases : tuple of str
         Names of the bases whose weights it was trained on, in their order.
     labels : tuple of str
@@ -64,6 +65,11 @@ class TrainedModel:
     card: Card
     name: str = "model"
 
+    @property
+    def sequential(self) -> bool:
+        """Whether it is a sequence model, which finds segments and labels at once."""
+        return self.card.classifier in SEQUENCE_NAMES
+
     def columns(self, descriptors: Descriptors) -> np.ndarray:
         """(bases,) which columns of the weights are the model's bases, in the model's order.
 
@@ -88,10 +94,21 @@ class TrainedModel:
         return np.array([place[name] for name in self.card.bases], dtype=int)
 
     def probabilities(self, weights: np.ndarray) -> np.ndarray:
-        """(K, labels) probability of each of `card.labels` for (K, bases) weights without NaN."""
+        """(K, labels) probability of each of `card.labels` for (K, bases) weights without NaN.
+
+        A sequence model judges no frame alone: see `SequenceLabeller.frame_probabilities`.
+        """
         if len(weights) == 0:
             return np.zeros((0, len(self.card.labels)))
         return self.estimator.predict_proba(weights)  # type: ignore[attr-defined]
+
+
+def on_bases(descriptors: Descriptors, bases: Sequence[str]) -> Descriptors:
+    """The take with these bases only, in this order."""
+    if descriptors.names == tuple(bases):
+        return descriptors
+    columns = [descriptors.names.index(name) for name in bases]
+    return replace(descriptors, weights=descriptors.weights[:, columns], names=tuple(bases))
 
 
 def _few(names: list[str], most: int = 5) -> str:

@@ -21,6 +21,7 @@ from typing import Any
 
 from signface.errors import SignfaceError
 from signface.files import shipped, whole_file
+from signface.label.labellers import SEQUENCE_NAMES
 from signface.label.model import Card, TrainedModel
 
 CARD = "signface.json"
@@ -32,6 +33,9 @@ TRUSTED = (
     "sklearn.calibration._SigmoidCalibration",
     "sklearn.model_selection._split.StratifiedKFold",
     "sklearn.tree._tree.Tree",
+    "signface.label.sequence.SequenceLabeller",
+    "sklearn.ensemble._hist_gradient_boosting.predictor.TreePredictor",
+    "sklearn.neural_network._stochastic_optimizers.AdamOptimizer",
 )
 
 #: No trained classifier of ours unpacks to more (bytes): a small file that does is no honest one.
@@ -129,7 +133,11 @@ def load_model(name_or_path: str | PathLike[str] = "default") -> TrainedModel:
             file=file,
             hint=f"it was written by signface {card.version}; train it again with signface train",
         ) from error
-    if classes != card.labels or features != len(card.bases) or not hasattr(estimator, "predict_proba"):
+    if (
+        classes != card.labels
+        or features != len(card.bases)
+        or not hasattr(estimator, "annotate" if card.classifier in SEQUENCE_NAMES else "predict_proba")
+    ):
         raise SignfaceError("its estimator and its card do not belong together", file=file, hint="train it again")
     return TrainedModel(estimator, card, name=file.stem)
 

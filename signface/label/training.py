@@ -11,15 +11,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
-from signface.label.labellers import make_labeller
+from signface.label.labellers import SEQUENCE_NAMES, make_labeller
 from signface.label.labelling import label_spans
-from signface.label.model import Card, TrainedModel
+from signface.label.model import Card, TrainedModel, on_bases
 from signface.label.vocabulary import AFFECTS
 from signface.segment.segments import Segments
 
@@ -134,14 +135,17 @@ def train_model(
     rate: float = TRAINING_RATE,
     name: str = "model",
 ) -> TrainedModel:
-    """Train a classifier on the frames of the stable segments of annotated takes.
+    """Train a classifier on annotated takes.
+
+    Those of `NAMES` of `signface.label.labellers` learn from the frames of the stable segments; the sequence models of
+    `SEQUENCE_NAMES` from whole takes, transitions included.
 
     Parameters
     ----------
     examples : sequence of Example
         The training takes, and no others. Their order does not matter.
     classifier : str
-        A name of `signface.label.labellers.NAMES`.
+        A name of one of them.
     seed : int
         Two trainings with one seed on the same takes give the same model.
     face, layout, corpus, scores : optional
@@ -156,12 +160,36 @@ def train_model(
     SignfaceError
         There is no training frame, only one label, or a take has other bases.
     """
-    labeller = make_labeller(classifier, seed=seed)
     if not examples:
         raise SignfaceError("there is no annotated take to train on", hint="name other kinds or another signer")
     ordered = sorted(examples, key=lambda example: (example.signer, example.kind, example.take))
     bases = common_bases(ordered)
-    pairs = [training_frames(example, bases, rate=rate) for example in ordered]
+    fit = _fit_sequence if classifier in SEQUENCE_NAMES else _fit_frames
+    labeller, frames = fit(ordered, bases, classifier, seed, rate)
+    card = Card(
+        classifier=classifier,
+        bases=bases,
+        labels=tuple(str(label) for label in labeller.classes_),
+        face=face,
+        layout=layout,
+        corpus=corpus,
+        kinds=tuple(sorted({example.kind for example in ordered})),
+        signers=tuple(sorted({example.signer for example in ordered})),
+        takes=tuple(sorted(example.take for example in ordered)),
+        frames=frames,
+        seed=seed,
+        scores=dict(scores or {}),
+        version=version("signface"),
+    )
+    return TrainedModel(labeller, card, name=name)
+
+
+def _fit_frames(
+    examples: Sequence[Example], bases: Sequence[str], classifier: str, seed: int, rate: float
+) -> tuple[Any, int]:
+    """A classifier trained on frames of stable segments, and how many there were."""
+    labeller = make_labeller(classifier, seed=seed)
+    pairs = [training_frames(example, bases, rate=rate) for example in examples]
     weights = np.concatenate([pair[0] for pair in pairs])
     labels = np.concatenate([pair[1] for pair in pairs])
     found = [label for label in AFFECTS if label in set(labels)]
@@ -176,23 +204,18 @@ def train_model(
             f"the training takes hold less than half a second of {AFFECTS[rarest]} ({rarest})",
             hint="train on more takes of it, or on takes without it",
         )
-    labeller.fit(weights, labels)
-    card = Card(
-        classifier=classifier,
-        bases=bases,
-        labels=tuple(str(label) for label in labeller.classes_),
-        face=face,
-        layout=layout,
-        corpus=corpus,
-        kinds=tuple(sorted({example.kind for example in ordered})),
-        signers=tuple(sorted({example.signer for example in ordered})),
-        takes=tuple(sorted(example.take for example in ordered)),
-        frames=len(labels),
-        seed=seed,
-        scores=dict(scores or {}),
-        version=version("signface"),
-    )
-    return TrainedModel(labeller, card, name=name)
+    return labeller.fit(weights, labels), len(labels)
+
+
+def _fit_sequence(
+    examples: Sequence[Example], bases: Sequence[str], classifier: str, seed: int, rate: float
+) -> tuple[Any, int]:
+    """A sequence model trained on whole takes, and how many frames it saw."""
+    from signface.label.sequence import make_sequence_labeller
+
+    labeller = make_sequence_labeller(classifier, seed=seed)
+    labeller.fit([on_bases(e.descriptors, bases) for e in examples], [e.reference for e in examples])
+    return labeller, labeller.n_frames_
 
 
 def score_by_take(

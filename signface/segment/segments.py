@@ -1,4 +1,8 @@
-"""`Segments`: stretches of time, stable or transition, later with a label and a confidence."""
+"""`Segments`: stretches of time, stable or transition, later with a label and a confidence.
+
+- `write_segments`, `read_segments`: to and from a table on disk.
+- `value_at`: what a table says at some times.
+"""
 
 from __future__ import annotations
 
@@ -87,3 +91,20 @@ def read_segments(path: str | PathLike[str]) -> Segments:
     except (ValueError, pd.errors.ParserError, pd.errors.EmptyDataError) as error:
         raise SignfaceError("cannot be read as a table of segments", file=file) from error
     return Segments(table, name=file.stem, history=(f"read_segments {file.name}",))
+
+
+def value_at(table: pd.DataFrame, column: str, times: np.ndarray) -> np.ndarray:
+    """(K,) value of a column of a table of segments at some times; an empty string where no segment is.
+
+    Parameters
+    ----------
+    table : DataFrame
+        `start_s`, `end_s` and the column, in time order, without overlap.
+    column : str
+    times : (K,) array of seconds
+    """
+    if table.empty:
+        return np.full(len(times), "", dtype=object)
+    row = np.searchsorted(table["start_s"].to_numpy(float), times, side="right") - 1
+    inside = (row >= 0) & (times < table["end_s"].to_numpy(float)[row.clip(0)])
+    return np.where(inside, table[column].to_numpy(object)[row.clip(0)], "")
