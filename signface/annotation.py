@@ -87,11 +87,10 @@ def annotate(
     >>> found = annotate(read_recording("take.c3d"), model=load_model("default"))  # doctest: +SKIP
     >>> found.segments.table[["start_s", "end_s", "label"]]  # doctest: +SKIP
     """
-    from signface.label.labelling import label_segments
-    from signface.segment.segmentation import segment
+    from signface.label.labelling import find_segments
 
     descriptors = describe(recording, face=face, layout=layout, neutral=neutral, method=method, alpha=alpha)
-    segments = label_segments(descriptors, segment(descriptors), model)
+    segments = find_segments(descriptors, model)
     return Annotation(descriptors, segments, model.name)
 
 
