@@ -191,8 +191,8 @@ def _study(arguments: argparse.Namespace) -> None:
     write_layout(chosen, folder / f"{chosen.name}.csv", face)
     with whole_file(folder / f"{chosen.name}-distances.csv") as temporary:
         distances(chosen, face).to_csv(temporary, index=False)
-    for ending in ("pdf", "svg", "png"):
-        draw_sheet(face, chosen, folder / f"{chosen.name}-sheet.{ending}", note=f"Chosen by: {METHODS[method]}.")
+    sheets = [folder / f"{chosen.name}-sheet.{ending}" for ending in ("pdf", "svg", "png")]
+    draw_sheet(face, chosen, *sheets, note=f"Chosen by: {METHODS[method]}.")
     page = study_page(plan, face, entries, cells, table, method=method, material=material, warnings=warnings)
     with whole_file(folder / "report.html") as temporary:
         temporary.write_text(page, encoding="utf-8")

@@ -58,15 +58,15 @@ def distances(layout: MarkerLayout, face: FaceModel) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=columns)
 
 
-def draw_sheet(face: FaceModel, layout: MarkerLayout, path: str | PathLike[str], *, note: str = "") -> None:
+def draw_sheet(face: FaceModel, layout: MarkerLayout, *paths: str | PathLike[str], note: str = "") -> None:
     """Draw the sheet, A4 across.
 
     Parameters
     ----------
     face : FaceModel
     layout : MarkerLayout
-    path : path
-        Ends in .svg, .pdf or .png.
+    paths : path
+        Where to write it; each ends in .svg, .pdf or .png.
     note : str
         A line below the title.
 
@@ -109,8 +109,9 @@ def draw_sheet(face: FaceModel, layout: MarkerLayout, path: str | PathLike[str],
             va="top",
         )
         metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-        with whole_file(path) as temporary:
-            figure.savefig(temporary, metadata=metadata.get(temporary.suffix.lower()))
+        for path in paths:
+            with whole_file(path) as temporary:
+                figure.savefig(temporary, metadata=metadata.get(temporary.suffix.lower()))
 
 
 def _camera(points: np.ndarray, yaw: float, size: tuple[int, int]) -> Camera:
