@@ -3,9 +3,10 @@
     python -m benchmarks.corpus_run [--takes 10 100 1000] [--workers 2] [-o corpus_run.json]
 
 The takes are the four of corpora/mini, run forwards and backwards until they last 10 s at 200 Hz; each corpus has as
-many copies of them as it needs. For each size: seconds per take, the same once the processes have started (they load
-the classifier and compile the solver first), the highest resident memory of the main process and of the largest worker
-(sampled five times a second), and a second run, which has nothing to do but compare.
+many copies of them as it needs. For each size: seconds per take; the same once the processes have started (they load
+the classifier and compile the solver first); processor time per take, which a busy machine stretches less; the highest
+resident memory of the main process and of the largest worker (sampled five times a second); and the seconds of a second
+run, which has nothing to do but compare.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import argparse
 import json
 import os
 import platform
+import resource
 import subprocess
 import sys
 import tempfile
@@ -80,6 +82,7 @@ def measure(folder: Path, count: int, workers: int) -> dict[str, float]:
     """Run a corpus once as a process of its own."""
     command = [sys.executable, "-m", "signface.cli.main", "corpus", "run", str(folder), "--workers", str(workers)]
     begun, finished = time.monotonic(), []
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     peak = {"main": 0.0, "worker": 0.0}
     logs = folder / "annotated" / "logs"
@@ -99,6 +102,8 @@ def measure(folder: Path, count: int, workers: int) -> dict[str, float]:
     ended = time.monotonic()
     if process.returncode != 0:
         raise SystemExit(f"the run failed: {told}")
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    processor = after.ru_utime + after.ru_stime - used.ru_utime - used.ru_stime
     first, already = finished[0] if finished else (begun, 0)
     return {
         "takes": count,
@@ -106,6 +111,7 @@ def measure(folder: Path, count: int, workers: int) -> dict[str, float]:
         "seconds_per_take": round((ended - begun) / count, 4),
         "seconds_to_first_take": round(first - begun, 2),
         "seconds_per_take_once_started": round((ended - first) / max(1, count - already), 4),
+        "processor_seconds_per_take": round(processor / count, 4),
         "peak_main_mb": round(peak["main"], 1),
         "peak_worker_mb": round(peak["worker"], 1),
     }
