@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.metrics import confusion_matrix, f1_score
 
-from signface.evaluate.classification import accuracy_interval, classification_metrics
+from signface.evaluate.classification import accuracy_interval, classification_metrics, mcnemar
 from signface.label.vocabulary import AFFECTS
 
 LABELS = list(AFFECTS)
@@ -59,3 +59,15 @@ def test_the_interval_is_wider_when_errors_come_by_whole_takes():
 
 def test_one_take_has_no_interval():
     assert accuracy_interval([True, False], ["a", "a"]) is None
+
+
+def test_balanced_accuracy_gives_each_label_the_same_weight():
+    scores = classification_metrics(["N"] * 9 + ["J"], ["N"] * 10, ["N", "J"])
+    assert scores["accuracy"] == 0.9
+    assert scores["balanced_accuracy"] == 0.5
+
+
+def test_mcnemar_looks_at_the_items_on_which_two_differ():
+    first, second = [True] * 10 + [False] * 5, [True] * 2 + [False] * 8 + [False] * 5
+    assert mcnemar(first, second) == {"only_first": 8, "only_second": 0, "p": pytest.approx(2 * 0.5**8)}
+    assert mcnemar(first, first)["p"] == 1

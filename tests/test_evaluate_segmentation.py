@@ -10,9 +10,12 @@ from hypothesis import strategies as st
 
 from signface.evaluate.segmentation import (
     boundary_f1,
+    edit_score,
     frame_agreement,
     mean_iou,
+    over_segmentation,
     segmentation_metrics,
+    under_segmentation,
     value_at,
 )
 
@@ -62,7 +65,7 @@ def test_measures_do_not_depend_on_where_time_begins(one, other, shift):
         return segments.assign(start_s=segments.start_s + shift, end_s=segments.end_s + shift)
 
     for measure in (mean_iou, frame_agreement):
-        assert measure(one, other) == pytest.approx(measure(moved(one), moved(other)), abs=1e-6)
+        assert measure(one, other) == pytest.approx(measure(moved(one), moved(other)), abs=1e-5)  # microseconds
 
 
 def test_values_worked_out_by_hand():
@@ -106,3 +109,23 @@ def test_takes_are_pooled():
 def test_values_at_times_are_those_of_the_segments_there():
     segments = table([0, 1, 2]).assign(label=["N", "J"])
     assert value_at(segments, "label", np.array([-0.1, 0, 0.99, 1, 2])).tolist() == ["", "N", "N", "J", ""]
+
+
+def stable_and_moving(*marks, labels=None):
+    kinds = ["stable" if i % 2 == 0 else "transition" for i in range(len(marks) - 1)]
+    table = pd.DataFrame({"start_s": marks[:-1], "end_s": marks[1:], "kind": kinds})
+    return table if labels is None else table.assign(label=labels)
+
+
+def test_a_segment_cut_in_two_is_counted_as_cut_and_not_the_other_way():
+    whole, cut = stable_and_moving(0, 10, 11, 20), stable_and_moving(0, 4, 5, 10, 11, 20)
+    assert over_segmentation(whole, cut) == 0.5
+    assert under_segmentation(whole, cut) == 0
+    assert under_segmentation(cut, whole) == 0.5
+    assert over_segmentation(whole, whole) == under_segmentation(whole, whole) == 0
+
+
+def test_the_edit_score_asks_for_the_order_and_not_for_the_times():
+    one = stable_and_moving(0, 1, 2, 3, labels=["N", "NJ", "J"])
+    assert edit_score(one, stable_and_moving(0, 2, 4, 9, labels=["N", "NJ", "J"])) == 1
+    assert edit_score(one, stable_and_moving(0, 1, 2, 3, labels=["N", "NA", "A"])) == pytest.approx(1 / 3)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -12,9 +13,10 @@ from signface.cli.options import add_face_arguments
 from signface.cli.progress import progress
 from signface.cli.train import words
 from signface.errors import SignfaceError
+from signface.label.labellers import NAMES, SEQUENCE_NAMES
 
 EXAMPLE = """  signface evaluate corpora/feel -o reports/feel
-  signface evaluate corpora/feel -o reports/feel --train-kinds IE,SE --test-kinds EU --protocol across"""
+  signface evaluate corpora/feel -o reports/feel --train-kinds IE,SE,EU --protocol across --classifiers net-hsmm"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,6 +34,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("within", "across"),
         help="train on the same signer, or on all others (default: both, if there are two signers)",
     )
+    parser.add_argument(
+        "--classifiers",
+        type=words,
+        metavar="NAMES",
+        default=list(NAMES),
+        help=f"those of the thesis ({','.join(NAMES)}, the default) or sequence models ({','.join(SEQUENCE_NAMES)})",
+    )
     parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")
     add_face_arguments(parser)
 
@@ -41,10 +50,17 @@ def run(arguments: argparse.Namespace) -> None:
     from signface.corpus.examples import solve_examples
     from signface.corpus.manifest import read_corpus
 
-    both = sorted(set(arguments.train_kinds) & set(arguments.test_kinds))
-    if both:
+    unknown = [name for name in arguments.classifiers if name not in NAMES | SEQUENCE_NAMES]
+    if unknown or not arguments.classifiers:
         raise SignfaceError(
-            f"{', '.join(both)} would be both trained on and tested", hint="choose kinds that do not overlap"
+            f"there is no classifier named {unknown[0]}" if unknown else "no classifier is named",
+            hint=f"choose among {', '.join(NAMES | SEQUENCE_NAMES)}",
+        )
+    both = sorted(set(arguments.train_kinds) & set(arguments.test_kinds))
+    if both and arguments.protocol != "across":
+        raise SignfaceError(
+            f"{', '.join(both)} would be both trained on and tested",
+            hint="choose kinds that do not overlap, or --protocol across, which tests signers that were not trained on",
         )
     if arguments.output.exists() and not arguments.output.is_dir():
         raise SignfaceError("is a file, not a folder", file=arguments.output, hint="name a folder for the report")
@@ -59,13 +75,28 @@ def run(arguments: argparse.Namespace) -> None:
         layout=arguments.layout,
         progress=lambda items: progress(items, "solving", total=sum(t.annotation is not None for t in corpus)),
     )
-    metrics = measure(examples, protocols, arguments.train_kinds, arguments.test_kinds, arguments.seed)
+    metrics = measure(
+        examples,
+        protocols,
+        arguments.train_kinds,
+        arguments.test_kinds,
+        arguments.seed,
+        classifiers=arguments.classifiers,
+    )
     write_results(metrics, arguments.output, corpus=whole.folder.resolve().name)
     print_results(metrics)
     print(f"report: {arguments.output / 'report.html'}")
 
 
-def measure(examples: list, protocols: list[str], train_kinds: list[str], test_kinds: list[str], seed: int) -> dict:
+def measure(
+    examples: list,
+    protocols: list[str],
+    train_kinds: list[str],
+    test_kinds: list[str],
+    seed: int,
+    *,
+    classifiers: Sequence[str] = tuple(NAMES),
+) -> dict:
     """The content of metrics.json.
 
     `classifiers` holds the first protocol; a second one stands under `also`, by its name.
@@ -78,7 +109,7 @@ def measure(examples: list, protocols: list[str], train_kinds: list[str], test_k
     for protocol in protocols:
         folds = folds_of(examples, protocol=protocol, train_kinds=train_kinds, test_kinds=test_kinds)
         shown = partial(progress, what=f"evaluating {protocol}")
-        found = evaluate(folds, seed=seed, segments=segments, progress=shown)
+        found = evaluate(folds, classifiers=classifiers, seed=seed, segments=segments, progress=shown)
         description = {
             "name": protocol,
             "train_kinds": train_kinds,
@@ -98,7 +129,7 @@ def measure(examples: list, protocols: list[str], train_kinds: list[str], test_k
             metrics = {**found.metrics, "protocol": description}
         else:
             metrics.setdefault("also", {})[protocol] = {
-                "classifiers": found.metrics["classifiers"],
+                **{key: value for key, value in found.metrics.items() if key != "segmentation"},
                 "protocol": description,
             }
     return metrics
@@ -164,3 +195,7 @@ def print_results(metrics: dict) -> None:
     cut = metrics["segmentation"]
     f1 = ", ".join(f"{value:.2f} within {tolerance} s" for tolerance, value in cut["boundary_f1"].items())
     print(f"segments: boundary F1 {f1}; mean IoU {cut['mean_iou']:.2f}; frame agreement {cut['frame_agreement']:.2f}")
+    for part in (metrics, *metrics.get("also", {}).values()):
+        for name, own in part["segmentation_by_classifier"].items():
+            f1 = ", ".join(f"{value:.2f} within {tolerance} s" for tolerance, value in own["boundary_f1"].items())
+            print(f"segments of {name}, {PROTOCOL_TITLES[part['protocol']['name']]}: boundary F1 {f1}")

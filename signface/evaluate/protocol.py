@@ -3,21 +3,23 @@
 - `PROTOCOLS`: what is trained on what.
 - `folds_of`: training and test takes of each signer.
 - `evaluate`: every classifier on every fold, on reference segments, automatic segments and frames.
+- `score_model`: the same for one model that is trained already.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 import pandas as pd
 
 from signface.errors import SignfaceError
-from signface.evaluate.classification import accuracy_interval, classification_metrics
+from signface.evaluate.classification import accuracy_interval, classification_metrics, mcnemar
 from signface.evaluate.segmentation import segmentation_metrics
 from signface.label.labellers import NAMES
-from signface.label.labelling import label_segments, label_spans
+from signface.label.labelling import find_segments, label_segments, label_spans
 from signface.label.model import TrainedModel
 from signface.label.training import Example, train_model
 from signface.label.vocabulary import AFFECTS
@@ -115,9 +117,10 @@ def evaluate(
     """Train every classifier on every fold and compare what it says with the reference.
 
     - *Reference segments*: the mean descriptor of each stable segment of the reference is classified.
-    - *Automatic segments*: so is that of each stable segment that `signface.segment` finds; it should have the
-      label that the reference gives to most of it. Those of which no part is stable in the reference have no right
-      label; they are counted (`without_reference`) and left out.
+    - *Automatic segments*: so is that of each stable segment that `signface.segment` finds (a sequence model finds
+      its own, which `segmentation_by_classifier` compares with the reference's); it should have the label that the
+      reference gives to most of it. Those of which no part is stable in the reference have no right label; they are
+      counted (`without_reference`) and left out.
     - *Frames*: the whole annotation, transitions included, is compared with the reference 25 times a second, with
       all transitions as one further label. This is what an annotator finds on opening the file.
 
@@ -125,7 +128,7 @@ def evaluate(
     ----------
     folds : sequence of Fold
     classifiers : sequence of str
-        Names of `signface.label.labellers.NAMES`.
+        Names of `NAMES` and `SEQUENCE_NAMES` of `signface.label.labellers`.
     seed : int
         Seed of the classifiers and of the bootstrap.
     segments : dict of Segments, optional
@@ -145,10 +148,15 @@ def evaluate(
     tables: dict[str, dict[str, list[pd.DataFrame]]] = {
         name: {"manual_segments": [], "automatic_segments": [], "frames": []} for name in classifiers
     }
+    own: dict[str, list[tuple[pd.DataFrame, pd.DataFrame]]] = {name: [] for name in classifiers}
     for fold, name in progress([(fold, name) for fold in folds for name in classifiers]):
         model = train_model(fold.train, classifier=name, seed=seed, name=name)
         for example in fold.test:
-            for section, table in _compared(example, known[example.take], model).items():
+            found = known[example.take]
+            if model.sequential:
+                found = find_segments(example.descriptors, model)
+                own[name].append((example.reference.table, found.table))
+            for section, table in _compared(example, found, model).items():
                 tables[name][section].append(table.assign(signer=fold.signer, take=example.take))
     pooled = {name: {key: pd.concat(parts) for key, parts in sections.items()} for name, sections in tables.items()}
     test = [example for fold in folds for example in fold.test]
@@ -156,6 +164,8 @@ def evaluate(
         "segmentation": segmentation_metrics((e.reference.table, known[e.take].table) for e in test),
         "classifiers": {name: _scores(sections, seed) for name, sections in pooled.items()},
     }
+    metrics["segmentation_by_classifier"] = {name: segmentation_metrics(pairs) for name, pairs in own.items() if pairs}
+    metrics["mcnemar"] = _mcnemar({name: sections["manual_segments"] for name, sections in pooled.items()})
     by_signer = {
         fold.signer: {
             name: _scores({key: table[table.signer == fold.signer] for key, table in sections.items()}, seed)
@@ -166,14 +176,33 @@ def evaluate(
     return Evaluation(metrics, by_signer)
 
 
+def score_model(model: TrainedModel, test: Sequence[Example], *, seed: int = 0) -> dict:
+    """What `evaluate` measures, for a model that is trained already, on takes that it was not trained on.
+
+    Returns
+    -------
+    dict
+        `manual_segments`, `automatic_segments` and `frames` as in metrics.json, and `segmentation`.
+    """
+    parts: dict[str, list[pd.DataFrame]] = {}
+    pairs = []
+    for example in test:
+        found = find_segments(example.descriptors, model) if model.sequential else segment(example.descriptors)
+        pairs.append((example.reference.table, found.table))
+        for section, table in _compared(example, found, model).items():
+            parts.setdefault(section, []).append(table.assign(take=f"{example.signer}/{example.take}"))
+    scores = _scores({section: pd.concat(tables) for section, tables in parts.items()}, seed)
+    return {**scores, "segmentation": segmentation_metrics(pairs)}
+
+
 def _compared(example: Example, found: Segments, model: TrainedModel) -> dict[str, pd.DataFrame]:
     """Reference label and label found of each reference segment, automatic segment and frame of a take."""
     descriptors, reference = example.descriptors, example.stable
     manual_labels, _ = label_spans(descriptors, reference[["start_s", "end_s"]].to_numpy(float), model)
     stable = found.table[found.table["kind"] == "stable"]
     spans = stable[["start_s", "end_s"]].to_numpy(float)
-    automatic_labels, _ = label_spans(descriptors, spans, model)
-    labelled = label_segments(descriptors, found, model)
+    automatic_labels = stable["label"].tolist() if found.labelled else label_spans(descriptors, spans, model)[0]
+    labelled = found if found.labelled else label_segments(descriptors, found, model)
     times = np.arange(descriptors.start + 0.5 / FRAMES_RATE, descriptors.start + descriptors.duration, 1 / FRAMES_RATE)
     truth, said = (_annotation_at(segments.table, times) for segments in (example.reference, labelled))
     annotated = truth != ""
@@ -196,6 +225,15 @@ def most_overlapping(spans: np.ndarray, reference: pd.DataFrame) -> list[str]:
         by_label = pd.Series(overlap).groupby(reference["label"].to_numpy(object)).sum()
         labels.append(str(by_label.idxmax()) if overlap.sum() > 0 else "")
     return labels
+
+
+def _mcnemar(tables: dict[str, pd.DataFrame]) -> list[dict]:
+    """McNemar's test between each pair of classifiers on the same reference segments."""
+    hits = {name: (table["truth"] == table["found"]).tolist() for name, table in tables.items()}
+    return [
+        {"first": first, "second": second, **mcnemar(hits[first], hits[second])}
+        for first, second in combinations(hits, 2)
+    ]
 
 
 def _annotation_at(table: pd.DataFrame, times: np.ndarray) -> np.ndarray:

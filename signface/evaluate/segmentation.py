@@ -3,10 +3,12 @@
 - `boundary_f1`: boundaries found within a tolerance, both ways.
 - `mean_iou`: overlap of each segment with its best counterpart.
 - `frame_agreement`: share of the time on which both say stable, or both say transition.
-- `segmentation_metrics`: the three over the takes of a corpus.
+- `over_segmentation`, `under_segmentation`: segments that are cut into several, either way.
+- `edit_score`: whether the order of the segments is the same.
+- `segmentation_metrics`: all of them over the takes of a corpus.
 
-All are symmetric, lie between 0 and 1, and are 1 for equal tables. A table has the columns `start_s`, `end_s` and
-`kind`, in time order. Only the time that both tables cover is compared.
+The first three are symmetric, lie between 0 and 1, and are 1 for equal tables. A table has the columns `start_s`,
+`end_s` and `kind`, in time order. Only the time that both tables cover is compared.
 """
 
 from __future__ import annotations
@@ -57,6 +59,51 @@ def frame_agreement(reference: pd.DataFrame, found: pd.DataFrame) -> float:
     return 1.0 if common == 0 else same / common
 
 
+def over_segmentation(reference: pd.DataFrame, found: pd.DataFrame) -> float:
+    """Share of the reference's stable segments that are cut: two or more stable ones found lie mostly in them."""
+    cut, total = _cut(reference, found)
+    return 0.0 if total == 0 else cut / total
+
+
+def under_segmentation(reference: pd.DataFrame, found: pd.DataFrame) -> float:
+    """Share of the stable segments found in which two or more of the reference's stable segments mostly lie."""
+    return over_segmentation(found, reference)
+
+
+def edit_score(reference: pd.DataFrame, found: pd.DataFrame) -> float:
+    """One less the edit distance of the two orders of segments, over the length of the longer (Lea et al. 2017).
+
+    The orders are those of the labels where both tables have them, else of the kinds. It asks whether everything
+    happened and in which order, not when. 1 if both tables are empty.
+
+    Examples
+    --------
+    >>> one = pd.DataFrame({"start_s": [0, 1.0, 2], "end_s": [1.0, 2, 3], "kind": ["stable", "transition", "stable"]})
+    >>> edit_score(one, one), round(edit_score(one, one[:2]), 2)
+    (1.0, 0.67)
+    """
+    column = "label" if "label" in reference and "label" in found else "kind"
+    first, second = reference[column].tolist(), found[column].tolist()
+    if not first and not second:
+        return 1.0
+    row = list(range(len(second) + 1))
+    for i, one in enumerate(first, start=1):
+        before, row[0] = row[0], i
+        for j, other in enumerate(second, start=1):
+            before, row[j] = row[j], min(row[j] + 1, row[j - 1] + 1, before + (one != other))
+    return 1 - row[-1] / max(len(first), len(second))
+
+
+def _cut(whole: pd.DataFrame, parts: pd.DataFrame) -> tuple[int, int]:
+    """How many stable segments of the one table hold two or more of the other, and how many there are."""
+    (start, end), (begin, stop) = (
+        table.loc[table["kind"] == "stable", ["start_s", "end_s"]].to_numpy(float).T for table in (whole, parts)
+    )
+    overlap = np.minimum(end[:, None], stop) - np.maximum(start[:, None], begin)
+    inside = overlap > 0.5 * (stop - begin)
+    return int((inside.sum(axis=1) >= 2).sum()), len(start)
+
+
 def segmentation_metrics(pairs: Iterable[tuple[pd.DataFrame, pd.DataFrame]]) -> dict:
     """The metrics over several takes: boundaries, segments and seconds are pooled, so that long takes count more.
 
@@ -69,7 +116,7 @@ def segmentation_metrics(pairs: Iterable[tuple[pd.DataFrame, pd.DataFrame]]) -> 
     -------
     dict
         `boundary_f1` (by tolerance), `mean_iou`, `frame_agreement`, and how many segments there were
-        (`n_reference`, `n_found`).
+        (`n_reference`, `n_found`); `over_segmentation`, `under_segmentation` and `edit_score` (mean over the takes).
     """
     tables = [(reference, found) for reference, found in pairs]
     scores: dict = {"boundary_f1": {}}
@@ -80,6 +127,10 @@ def segmentation_metrics(pairs: Iterable[tuple[pd.DataFrame, pd.DataFrame]]) -> 
     times = np.array([_agreeing_time(*pair) for pair in tables]).reshape(-1, 2).sum(axis=0)
     scores["mean_iou"] = float(ious.mean()) if len(ious) else 1.0
     scores["frame_agreement"] = float(times[0] / times[1]) if times[1] else 1.0
+    for name, flipped in (("over_segmentation", False), ("under_segmentation", True)):
+        cut = np.array([_cut(*(pair[::-1] if flipped else pair)) for pair in tables]).reshape(-1, 2).sum(axis=0)
+        scores[name] = float(cut[0] / cut[1]) if cut[1] else 0.0
+    scores["edit_score"] = float(np.mean([edit_score(*pair) for pair in tables])) if tables else 1.0
     scores["n_reference"] = sum(len(reference) for reference, _ in tables)
     scores["n_found"] = sum(len(found) for _, found in tables)
     return scores

@@ -35,7 +35,6 @@ TRUSTED = (
     "sklearn.tree._tree.Tree",
     "signface.label.sequence.SequenceLabeller",
     "sklearn.ensemble._hist_gradient_boosting.predictor.TreePredictor",
-    "sklearn.neural_network._stochastic_optimizers.AdamOptimizer",
 )
 
 #: No trained classifier of ours unpacks to more (bytes): a small file that does is no honest one.

@@ -21,7 +21,7 @@ from signface.label.border_features import border_features
 from signface.label.frame_features import TRANSITION, FrameFeatures, frame_states
 from signface.label.labellers import SEQUENCE_NAMES
 from signface.label.semi_markov import SegmentModel
-from signface.label.vocabulary import AFFECTS, join
+from signface.label.vocabulary import join
 from signface.segment.segments import Segments
 
 #: The two halves of a transition, which a frame classifier tells apart better than one state that begins as one
@@ -153,7 +153,7 @@ class SequenceLabeller(BaseEstimator):
         self.bases_ = tuple(takes[0].names)
         self.n_features_in_ = len(self.bases_)
         held = {str(label) for reference in references for label in reference.table.query("kind == 'stable'")["label"]}
-        self.classes_ = np.array([label for label in AFFECTS if label in held])
+        self.classes_ = np.array(sorted(held))
         states = [_halved(frame_states(r, self._frames.times(d))) for d, r in zip(takes, references, strict=True)]
         known = [state != "" for state in states]
         state = np.concatenate([state[k] for state, k in zip(states, known, strict=True)])
@@ -176,6 +176,9 @@ class SequenceLabeller(BaseEstimator):
         with warnings.catch_warnings():  # a network trains for a fixed time, which is meant
             warnings.simplefilter("ignore", ConvergenceWarning)
             self.frames_ = clone(self.frame_classifier).fit(np.concatenate(features), state)
+        for member in getattr(self.frames_, "estimators_", []):
+            for left_over in ("_optimizer", "_best_coefs", "_best_intercepts"):  # four fifths of the size of a net
+                vars(member).pop(left_over, None)
         self.borders_ = None
         if self.border_classifier is not None:
             seen = np.concatenate([border[k] for border, k in zip(borders, known, strict=True)])
