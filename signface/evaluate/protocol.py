@@ -160,7 +160,7 @@ def evaluate(
                 tables[name][section].append(table.assign(signer=fold.signer, take=example.take))
     pooled = {name: {key: pd.concat(parts) for key, parts in sections.items()} for name, sections in tables.items()}
     test = [example for fold in folds for example in fold.test]
-    metrics = {
+    metrics: dict = {
         "segmentation": segmentation_metrics((e.reference.table, known[e.take].table) for e in test),
         "classifiers": {name: _scores(sections, seed) for name, sections in pooled.items()},
     }
