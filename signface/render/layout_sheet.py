@@ -90,7 +90,7 @@ def draw_sheet(face: FaceModel, layout: MarkerLayout, *paths: str | PathLike[str
             axes = figure.add_axes(place)
             size = (_PIXELS, round(_PIXELS * place[3] * 8.27 / (place[2] * 11.69)))
             camera = _camera(layout.points(face), yaw, size)
-            axes.imshow(render(mesh, camera, pale), interpolation="antialiased")
+            axes.imshow(render(mesh, camera, pale, samples=1), interpolation="antialiased")
             axes.set(xlim=(0, size[0]), ylim=(size[1], 0))
             axes.set_title(title, fontsize=10)
             axes.axis("off")
