@@ -131,10 +131,20 @@ def write_weights(descriptors: Descriptors, path: str | PathLike[str]) -> None:
     with whole_file(path) as temporary:
         if suffix == ".csv":
             # A rate is recovered from the times: a microsecond's rounding would show in a take of few frames.
-            table["time_s"] = [f"{time:.9f}" for time in table["time_s"]]
-            table.to_csv(temporary, index=False, float_format="%.6f")
+            rounded = table.round(6).assign(time_s=table["time_s"].round(9))
+            _write_csv(rounded, temporary)
         else:
             table.to_parquet(temporary, index=False)
+
+
+def _write_csv(table: pd.DataFrame, path: Path) -> None:
+    """Write a table of numbers; by Arrow, which is some ten times as fast as pandas at this."""
+    import pyarrow as pa
+    from pyarrow import csv
+
+    with open(path, "wb") as file:
+        file.write((",".join(table.columns) + "\n").encode())  # Arrow would put the names in quotes
+        csv.write_csv(pa.Table.from_pandas(table, preserve_index=False), file, csv.WriteOptions(include_header=False))
 
 
 def is_weights_table(columns: list[str]) -> bool:
