@@ -56,7 +56,7 @@ def annotate(
     method: str = "thin-shell",
     alpha: float | None = None,
 ) -> Annotation:
-    """Solve, segment and label one recording (seed 001, chapters 4 and 5).
+    """Solve, segment and label one recording (Reverdy 2019, chapters 4 and 5).
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from signface.face.mesh import Mesh
 
 @dataclass(frozen=True)
 class FaceModel:
-    """A blendshape face (seed 001, eq. 4.1 and 5.2): `neutral + sum_i weight_i * bases[i]`.
+    """A blendshape face (Reverdy 2019, eq. 4.1 and 5.2): `neutral + sum_i weight_i * bases[i]`.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Operators on a face's skin: stiffness, mass, and the thin-shell energy of its bases.
 
 - `stiffness_and_mass`: the cotangent Laplacian and the lumped vertex areas.
-- `thin_shell_matrices`: stretching and bending energy of every pair of bases (seed 001, eq. 5.15 to 5.17).
+- `thin_shell_matrices`: stretching and bending energy of every pair of bases (Reverdy 2019, eq. 5.15 to 5.17).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _KNOWN: dict[int, tuple[weakref.ref[FaceModel], tuple[np.ndarray, np.ndarray]]] 
 
 
 def stiffness_and_mass(mesh: Mesh) -> tuple[sparse.csr_matrix, np.ndarray]:
-    """The cotangent Laplacian of a mesh and the area around each vertex (seed 001, eq. 5.11 and 5.12).
+    """The cotangent Laplacian of a mesh and the area around each vertex (Reverdy 2019, eq. 5.11 and 5.12).
 
     The Laplacian is the robust one of Sharp and Crane, "A Laplacian for Nonmanifold Triangle Meshes" (2020), which
     stays positive semidefinite on needle-shaped and non-manifold triangles.

@@ -1,4 +1,4 @@
-"""Which markers, how many, where (seed 001, chapter 3).
+"""Which markers, how many, where (Reverdy 2019, chapter 3).
 
 What is there to compare:
 

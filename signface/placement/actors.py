@@ -1,7 +1,7 @@
 """Actors who do not exist: a head of their own, a range of motion, and takes to test on.
 
 - `draw_actors`: heads of the synthetic corpus with both kinds of motion.
-- `range_of_motion`: a face that goes through all it can do (seed 001, 3.4.2).
+- `range_of_motion`: a face that goes through all it can do (Reverdy 2019, 3.4.2).
 - `signed_takes`: utterances in sign language with affect, another kind of motion than the one trained on.
 - `Virtual`: the markers of a layout on an actor, clean or as they are really glued.
 
@@ -25,7 +25,7 @@ from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.face.reading import read_identities
 
-#: Frames per second, as in seed 001, 3.4.1.
+#: Frames per second, as in Reverdy 2019, 3.4.1.
 RATE = 30.0
 
 

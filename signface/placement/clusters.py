@@ -1,4 +1,4 @@
-"""K-means on the motion of the skin (seed 001, 3.6, eq. 3.6 and 3.7).
+"""K-means on the motion of the skin (Reverdy 2019, 3.6, eq. 3.6 and 3.7).
 
 - `trajectories`: the normalised trajectory of every vertex that moves, over the frames of one or several actors.
 - `cluster_markers`: the vertex nearest to each centroid, under the captor's rules.

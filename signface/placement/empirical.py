@@ -21,7 +21,7 @@ from signface.face.model import FaceModel
 from signface.face.reading import read_face
 from signface.files import models_folder
 
-#: The layouts of seed 001, 3.5, and where each comes from.
+#: The layouts of Reverdy (2019), 3.5, and where each comes from.
 EMPIRICAL = {
     "mpeg4-53": "feature points of MPEG-4 (ISO/IEC 14496-2) that lie on skin, without the lids' edges",
     "face-robot-35": "32 controls driven by motion capture and 3 markers for the head, after Face Robot's manual",

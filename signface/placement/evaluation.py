@@ -1,4 +1,4 @@
-"""How well a layout tells what the face does (seed 001, 3.3.2, eq. 3.5).
+"""How well a layout tells what the face does (Reverdy 2019, 3.3.2, eq. 3.5).
 
 - `skin_metric`: the squared error of the skin as a quadratic form of the weights' errors.
 - `evaluate_layout`: train on one actor's range of motion, test on the others' takes, by three mappings.

@@ -1,4 +1,4 @@
-"""Gaussian processes from marker positions to weights (seed 001, 3.3.1, eq. 3.2 to 3.4).
+"""Gaussian processes from marker positions to weights (Reverdy 2019, 3.3.1, eq. 3.2 to 3.4).
 
 - `GaussianProcess`: the exact posterior mean.
 - `SparseOnlineGaussianProcess`: the same seen frame by frame, on a small set of basis vectors.

@@ -1,4 +1,4 @@
-"""A take at a glance: its energy curves above its labelled segments (seed 001, figure 4.3).
+"""A take at a glance: its energy curves above its labelled segments (Reverdy 2019, figure 4.3).
 
 - `draw_timeline`: the figure; `draw_timeline_on`: on a part of another.
 - `save_figure`: any figure to a file, whole or not at all.

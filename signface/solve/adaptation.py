@@ -1,6 +1,6 @@
 """Morphological adaptation: marker positions on the signer's face, carried to the avatar's face.
 
-- `MorphologicalAdaptation`: seed 001, 5.2.2, eq. 5.18 to 5.20: a triharmonic radial basis function with an affine part
+- `MorphologicalAdaptation`: Reverdy 2019, eq. 5.18 to 5.20: a triharmonic radial basis function with an affine part
   through the P neutral markers of signer and avatar.
 - `SimilarityAdaptation`: displacements turned and scaled as the whole face is.
 - `make_adaptation`: either by name.

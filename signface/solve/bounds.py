@@ -1,6 +1,6 @@
 """What holds the weights in their range and at rest, apart from the shell.
 
-**Bounds.** Eq. 5.24 of seed 001 sums `exp((lower - c) / s) + exp((c - upper) / s)` over the weights, with `s = 0.1`,
+**Bounds.** Eq. 5.24 (Reverdy 2019) sums `exp((lower - c) / s) + exp((c - upper) / s)` over the weights, with `s = 0.1`,
 `lower = -0.1` and `upper = 1.1`. Used as printed, its slope is not zero where nothing is wrong: at c = 0 it is -3.7, so
 that a neutral face is pushed off rest, and a weight that the markers do not determine drifts to 0.5. We therefore take
 the tangent at 0 off the lower exponential and the tangent at 1 off the upper one, and let each act beyond its point

@@ -1,4 +1,4 @@
-"""Direct thin-shell deformation: the mesh itself moved by the markers, no bases (seed 001, 2.3.4, eq. 2.15 to 2.17).
+"""Direct thin-shell deformation: the mesh moved by the markers, no bases (Reverdy 2019, 2.3.4, eq. 2.15 to 2.17).
 
 All vertices are free; the skin takes the displacement of least stretching and bending that carries the markers where
 they are. Weights are then read off by projecting that displacement on the bases.

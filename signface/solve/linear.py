@@ -1,7 +1,7 @@
 """Rivals of the thin shell that need nothing but the markers: least squares, with and without bounds.
 
 - `LeastSquares`: the unconstrained minimum of eq. 5.23, one matrix product a frame.
-- `NonNegative`: weights of at least 0 (Lawson and Hanson's NNLS, seed 001, 2.3.3).
+- `NonNegative`: weights of at least 0 (Lawson and Hanson's NNLS, Reverdy 2019, 2.3.3).
 - `Bounded`: weights from 0 to 1.
 """
 

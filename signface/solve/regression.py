@@ -1,9 +1,9 @@
 """Mappings learnt from pairs of markers and weights.
 
-- `RbfNetwork`: a radial basis function network (seed 001, eq. 2.13 and 2.14).
+- `RbfNetwork`: a radial basis function network (Reverdy 2019, eq. 2.13 and 2.14).
 - `GaussianProcess`: Gaussian process regression.
 - `SparseOnlineGaussianProcess`: its sparse online form (Csato and Opper, "Sparse On-Line Gaussian Processes", Neural
-  Computation 14, 2002; seed 001, 3.3.1).
+  Computation 14, 2002; Reverdy 2019, 3.3.1).
 - `example_pairs`: pairs made with the avatar, where none were recorded.
 
 The three share `solve`; a missing marker is first put where the pairs would expect it from the others.

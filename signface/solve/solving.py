@@ -71,7 +71,7 @@ def prepare_take(
     filter_method: str = "butterworth",
     head_fallback: str | None = None,
 ) -> PreparedTake:
-    """Clean a take, take the head's motion away and adapt it to the avatar (seed 001, 5.2.1 and 5.2.2).
+    """Clean a take, take the head's motion away and adapt it to the avatar (Reverdy 2019, 5.2.1 and 5.2.2).
 
     Parameters and errors are those of `solve_take`.
     """
@@ -122,7 +122,7 @@ def solve_take(
     filter_method: str = "butterworth",
     head_fallback: str | None = None,
 ) -> Descriptors:
-    """Blendshape weights of a take (seed 001, 5.2).
+    """Blendshape weights of a take (Reverdy 2019, 5.2).
 
     Parameters
     ----------

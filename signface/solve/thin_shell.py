@@ -1,4 +1,4 @@
-"""The thin-shell regularised solve: markers to weights (seed 001, 5.2.3, eq. 5.21 to 5.30).
+"""The thin-shell regularised solve: markers to weights (Reverdy 2019, 5.2.3, eq. 5.21 to 5.30).
 
 The energy of the weights `c` of one frame is
 

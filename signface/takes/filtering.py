@@ -25,7 +25,7 @@ ORDER = 2
 def raised_sine_response(frequencies: np.ndarray, cutoff_hz: float, width_hz: float) -> np.ndarray:
     """Gain of the raised-sine window: 1 up to `cutoff - width/2`, 0 from `cutoff + width/2`, half a sine between.
 
-    Equation 7.1 of the thesis in seed 000.
+    Equation 7.1 of the thesis of Kouadio (1997).
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def lowpass(take: Take, *, cutoff_hz: float = CUTOFF_HZ, method: str = "butterwo
         Frequency with half the power (`butterworth`) or half the amplitude (`raised-sine`), in Hz.
     method : str
         `butterworth`, fourth order over both passes; or `raised-sine`, the spectral window of equation 7.1 of the
-        thesis in seed 000 with a passage as wide as half the cutoff.
+        thesis of Kouadio (1997) with a passage as wide as half the cutoff.
 
     Raises
     ------
