@@ -19,6 +19,7 @@ from signface.errors import SignfaceError
 from signface.face.layout import ROLES, MarkerLayout
 from signface.face.mesh import Mesh
 from signface.face.model import FaceModel
+from signface.face.reading import MILLIMETRES
 from signface.files import shipped, whole_file
 
 #: A point of a layout may lie this far from the skin, in millimetres; farther, the layout is for another face.
@@ -88,7 +89,7 @@ def _placed(table: pd.DataFrame, face: FaceModel, file: Path, has_points: bool) 
     if has_points:
         points = table[["x", "y", "z"]].apply(pd.to_numeric, errors="coerce").to_numpy(float)
         given = np.isfinite(points).all(axis=1) & (corners[:, 0] < 0)
-        points = points[given] * {"m": 1000.0, "cm": 10.0, "dm": 100.0}.get(face.unit, 1.0)
+        points = points[given] * MILLIMETRES.get(face.unit, 1.0)
         if given.any():
             corners[given], barycentric[given], distance = nearest_points(face.mesh, points)
             if distance.max() > FARTHEST_MM:
@@ -104,7 +105,7 @@ def write_layout(layout: MarkerLayout, path: str | PathLike[str], face: FaceMode
     """Write a layout: markers on a vertex by `vertex`, others by `x, y, z` in the unit of the face's file."""
     on_vertex = (layout.corners >= 0).all(axis=1) & (layout.barycentric.max(axis=1) == 1.0)
     rows = []
-    scale = {"m": 1e-3, "cm": 0.1, "dm": 0.01}.get(face.unit, 1.0)
+    scale = 1.0 / MILLIMETRES.get(face.unit, 1.0)
     for row, (label, role) in enumerate(zip(layout.labels, layout.roles, strict=True)):
         place: tuple[object, ...] = (None, None, None, None)
         if on_vertex[row]:

@@ -18,6 +18,7 @@ from signface.face.model import FaceModel
 from signface.solve.adaptation import MorphologicalAdaptation, SimilarityAdaptation, make_adaptation
 from signface.solve.methods import make_solver
 from signface.solve.resting import resting_time
+from signface.solve.solver import Solution
 from signface.takes.filtering import CUTOFF_HZ, lowpass
 from signface.takes.gaps import LONG_S, SHORT_S, fill_gaps
 from signface.takes.labels import rename_to
@@ -56,6 +57,19 @@ class PreparedTake:
     adaptation: SimilarityAdaptation | MorphologicalAdaptation
     take: Take
     note: str
+
+    def described(self, face: FaceModel, solution: Solution, *notes: str) -> Descriptors:
+        """The descriptors of the take, from what a solver made of its displacements; `notes` end the history."""
+        return Descriptors(
+            weights=solution.weights,
+            names=face.names,
+            rate=self.take.rate,
+            start=self.take.start,
+            residual=solution.residual,
+            head=self.head,
+            name=self.take.name,
+            history=(*self.take.history, *notes),
+        )
 
 
 def prepare_take(
@@ -180,16 +194,7 @@ def solve_take(
     )
     solution = make_solver(method, face, prepared.layout, alpha=alpha).solve(prepared.displacements)
     note = f"{prepared.note}; solve {method}" + (f" alpha={alpha:g}" if alpha is not None else "")
-    return Descriptors(
-        weights=solution.weights,
-        names=face.names,
-        rate=take.rate,
-        start=take.start,
-        residual=solution.residual,
-        head=prepared.head,
-        name=take.name,
-        history=(*prepared.take.history, note),
-    )
+    return prepared.described(face, solution, note)
 
 
 def neutral_markers(take: Take, labels: list[str], neutral_s: float) -> tuple[list[str], np.ndarray]:

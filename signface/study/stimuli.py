@@ -85,16 +85,7 @@ def solve_methods(
     found = {}
     for method in methods:
         solution = make_solver(method.solver, face, prepared.layout, alpha=method.alpha).solve(prepared.displacements)
-        found[method.name] = Descriptors(
-            weights=solution.weights,
-            names=face.names,
-            rate=take.rate,
-            start=take.start,
-            residual=solution.residual,
-            head=prepared.head,
-            name=take.name,
-            history=(*prepared.take.history, prepared.note, f"solve {method.name}"),
-        )
+        found[method.name] = prepared.described(face, solution, prepared.note, f"solve {method.name}")
     return found
 
 
