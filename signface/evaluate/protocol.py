@@ -61,11 +61,16 @@ class Evaluation:
     """What `evaluate` measured.
 
     `metrics` is the content of metrics.json (see CONTRACT.md); `by_signer` has, for each signer, the same dictionary
-    of classifiers.
+    of classifiers. `tables` has what they were counted from: for each classifier its `manual_segments` and
+    `automatic_segments` (a row a stable segment: `signer, take, kind, start_s, end_s, truth, found, confidence`) and
+    its `frames` (a row a frame of 1 / `FRAMES_RATE`: `signer, take, kind, time_s, truth, found`). `truth` is empty
+    where the reference has no stable segment. `found` holds the labelled segments of each classifier, by take.
     """
 
     metrics: dict
     by_signer: dict[str, dict] = field(default_factory=dict)
+    tables: dict[str, dict[str, pd.DataFrame]] = field(default_factory=dict)
+    found: dict[str, dict[str, Segments]] = field(default_factory=dict)
 
 
 def folds_of(
@@ -149,6 +154,7 @@ def evaluate(
         name: {"manual_segments": [], "automatic_segments": [], "frames": []} for name in classifiers
     }
     own: dict[str, list[tuple[pd.DataFrame, pd.DataFrame]]] = {name: [] for name in classifiers}
+    annotated: dict[str, dict[str, Segments]] = {name: {} for name in classifiers}
     for fold, name in progress([(fold, name) for fold in folds for name in classifiers]):
         model = train_model(fold.train, classifier=name, seed=seed, name=name)
         for example in fold.test:
@@ -156,9 +162,13 @@ def evaluate(
             if model.sequential:
                 found = find_segments(example.descriptors, model)
                 own[name].append((example.reference.table, found.table))
-            for section, table in _compared(example, found, model).items():
-                tables[name][section].append(table.assign(signer=fold.signer, take=example.take))
-    pooled = {name: {key: pd.concat(parts) for key, parts in sections.items()} for name, sections in tables.items()}
+            compared, annotated[name][example.take] = _compared(example, found, model)
+            for section, table in compared.items():
+                tables[name][section].append(table)
+    pooled = {
+        name: {key: pd.concat(parts, ignore_index=True) for key, parts in sections.items()}
+        for name, sections in tables.items()
+    }
     test = [example for fold in folds for example in fold.test]
     metrics: dict = {
         "segmentation": segmentation_metrics((e.reference.table, known[e.take].table) for e in test),
@@ -173,7 +183,7 @@ def evaluate(
         }
         for fold in folds
     }
-    return Evaluation(metrics, by_signer)
+    return Evaluation(metrics, by_signer, pooled, annotated)
 
 
 def score_model(model: TrainedModel, test: Sequence[Example], *, seed: int = 0) -> dict:
@@ -189,28 +199,36 @@ def score_model(model: TrainedModel, test: Sequence[Example], *, seed: int = 0) 
     for example in test:
         found = find_segments(example.descriptors, model) if model.sequential else segment(example.descriptors)
         pairs.append((example.reference.table, found.table))
-        for section, table in _compared(example, found, model).items():
+        for section, table in _compared(example, found, model)[0].items():
             parts.setdefault(section, []).append(table.assign(take=f"{example.signer}/{example.take}"))
     scores = _scores({section: pd.concat(tables) for section, tables in parts.items()}, seed)
     return {**scores, "segmentation": segmentation_metrics(pairs)}
 
 
-def _compared(example: Example, found: Segments, model: TrainedModel) -> dict[str, pd.DataFrame]:
-    """Reference label and label found of each reference segment, automatic segment and frame of a take."""
+def _compared(example: Example, found: Segments, model: TrainedModel) -> tuple[dict[str, pd.DataFrame], Segments]:
+    """The tables of a take (see `Evaluation.tables`), and its labelled segments."""
     descriptors, reference = example.descriptors, example.stable
-    manual_labels, _ = label_spans(descriptors, reference[["start_s", "end_s"]].to_numpy(float), model)
+    manual = reference[["start_s", "end_s", "label"]].rename(columns={"label": "truth"})
+    manual["found"], manual["confidence"] = label_spans(
+        descriptors, manual[["start_s", "end_s"]].to_numpy(float), model
+    )
     stable = found.table[found.table["kind"] == "stable"]
     spans = stable[["start_s", "end_s"]].to_numpy(float)
-    automatic_labels = stable["label"].tolist() if found.labelled else label_spans(descriptors, spans, model)[0]
-    labelled = found if found.labelled else label_segments(descriptors, found, model)
+    automatic = stable[["start_s", "end_s"]].assign(truth=most_overlapping(spans, reference))
+    if found.labelled:
+        automatic["found"], automatic["confidence"] = stable["label"], stable["confidence"]
+        labelled = found
+    else:
+        automatic["found"], automatic["confidence"] = label_spans(descriptors, spans, model)
+        labelled = label_segments(descriptors, found, model)
     times = np.arange(descriptors.start + 0.5 / FRAMES_RATE, descriptors.start + descriptors.duration, 1 / FRAMES_RATE)
     truth, said = (_annotation_at(segments.table, times) for segments in (example.reference, labelled))
-    annotated = truth != ""
-    return {
-        "manual_segments": pd.DataFrame({"truth": reference["label"].to_numpy(object), "found": manual_labels}),
-        "automatic_segments": pd.DataFrame({"truth": most_overlapping(spans, reference), "found": automatic_labels}),
-        "frames": pd.DataFrame({"truth": truth[annotated], "found": said[annotated]}),
-    }
+    frames = pd.DataFrame({"time_s": times, "truth": truth, "found": said})[truth != ""]
+    tables = {"manual_segments": manual, "automatic_segments": automatic, "frames": frames}
+    for table in tables.values():
+        for place, column in enumerate(("signer", "take", "kind")):
+            table.insert(place, column, getattr(example, column))
+    return tables, labelled
 
 
 def most_overlapping(spans: np.ndarray, reference: pd.DataFrame) -> list[str]:
