@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from signface.errors import SignfaceError
+from signface.study.database import make_engine, make_tables
 from signface.study.extras import needed
 
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ def open_store(url_or_file: str | PathLike[str]) -> Store:
     where = "the database" if is_url else text
     try:
         url = sqlalchemy.make_url(text if is_url else f"sqlite:///{Path(text).resolve()}")
-        engine = _engine(sqlalchemy, url)
+        engine = make_engine(sqlalchemy, url)
         store = Store(engine)
         store.create()
     except (sqlalchemy.exc.OperationalError, sqlalchemy.exc.DatabaseError) as error:
@@ -101,69 +102,6 @@ def open_store(url_or_file: str | PathLike[str]) -> Store:
     except sqlalchemy.exc.ArgumentError as error:
         raise SignfaceError("is not a URL of a database", file="--database") from error
     return store
-
-
-def _engine(sqlalchemy: Any, url: Any) -> Engine:
-    if url.get_backend_name() != "sqlite":
-        return sqlalchemy.create_engine(url, pool_size=10, max_overflow=20, pool_pre_ping=True)
-    engine = sqlalchemy.create_engine(url, connect_args={"timeout": 30, "check_same_thread": False}, pool_size=20)
-
-    @sqlalchemy.event.listens_for(engine, "connect")
-    def prepare(connection: Any, _record: object) -> None:
-        connection.isolation_level = None  # the driver must not begin transactions of its own accord
-        for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "secure_delete=ON"):
-            connection.execute(f"PRAGMA {pragma}")
-
-    @sqlalchemy.event.listens_for(engine, "begin")
-    def begin(connection: Any) -> None:
-        # A transaction that reads before it writes would fail when another wrote in between; this one waits instead.
-        writes = connection.get_execution_options().get("writes", False)
-        connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
-
-    return engine
-
-
-def _tables(sqlalchemy: Any) -> tuple[Any, dict[str, Any]]:
-    metadata = sqlalchemy.MetaData()
-    Column, Text, Integer = sqlalchemy.Column, sqlalchemy.Text, sqlalchemy.Integer
-    moment = sqlalchemy.DateTime(timezone=True)
-
-    def owner() -> Any:
-        return sqlalchemy.ForeignKey("participants.id", ondelete="CASCADE")
-
-    tables = {
-        "settings": sqlalchemy.Table(
-            "settings", metadata, Column("key", Text, primary_key=True), Column("value", Text, nullable=False)
-        ),
-        "participants": sqlalchemy.Table(
-            "participants",
-            metadata,
-            Column("id", Integer, primary_key=True),
-            Column("pseudonym", Text, unique=True, nullable=False),
-            Column("token", Text, unique=True, nullable=False),
-            Column("language", Text, nullable=False),
-            Column("closed", Integer, nullable=False, default=0),
-            Column("started_at", moment, nullable=False),
-            Column("finished_at", moment),
-        ),
-        "shown": sqlalchemy.Table(
-            "shown",
-            metadata,
-            Column("participant", Integer, owner(), primary_key=True),
-            Column("stimulus", Text, primary_key=True),
-            Column("shown_at", moment, nullable=False),
-        ),
-        "answers": sqlalchemy.Table(
-            "answers",
-            metadata,
-            Column("participant", Integer, owner(), primary_key=True),
-            Column("stimulus", Text, primary_key=True),
-            Column("question", Text, primary_key=True),
-            Column("value", Text, nullable=False),
-            Column("answered_at", moment, nullable=False, index=True),
-        ),
-    }
-    return metadata, tables
 
 
 class Store:
@@ -179,7 +117,7 @@ class Store:
 
         self._sql = sqlalchemy
         self._engine = engine
-        self._metadata, self._tables = _tables(sqlalchemy)
+        self._metadata, self._tables = make_tables(sqlalchemy)
         dialect = engine.dialect.name
         self._insert = getattr(sqlalchemy.dialects, dialect).insert  # both know ON CONFLICT
         self._writer: Any = threading.Lock() if dialect == "sqlite" else contextlib.nullcontext()
