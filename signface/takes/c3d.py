@@ -1,7 +1,7 @@
-"""C3D, the binary format of motion-capture systems, through ezc3d.
+"""C3D, the binary format of motion-capture systems.
 
-- `read_c3d`: a file to a `Take`.
-- `write_c3d`: a `Take` to a file.
+- `open_c3d`: a file whose frames are read in pieces; `read_c3d`: all of it, as a `Take`.
+- `write_c3d`: a `Take` to a file, through ezc3d.
 
 The format is described in the C3D User Guide (c3d.org): a header block of 512 bytes, a parameter section of groups
 (POINT holds labels, unit, rate), and the data section, frame by frame x, y, z and the residual of each point.
@@ -9,62 +9,27 @@ The format is described in the C3D User Guide (c3d.org): a header block of 512 b
 
 from __future__ import annotations
 
-import math
+from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from signface.errors import SignfaceError
 from signface.files import whole_file
-from signface.takes.c3d_structure import check_structure
+from signface.takes.c3d_structure import MOST_FRAMES, Structure, read_structure
 from signface.takes.labels import clean_labels
+from signface.takes.recording import TakeFile
 from signface.takes.take import Take
-from signface.takes.units import to_millimetres
-
-#: Frames are counted in 16 bits; ezc3d cuts longer takes without a word.
-MOST_FRAMES = 65535
+from signface.takes.units import SAMPLE, unit_factor
 
 
-def _values(group: dict[str, Any], name: str) -> list[Any]:
-    """The values of a parameter and of its continuations (`LABELS`, `LABELS2`, ...: 255 entries each at most)."""
-    values: list[Any] = []
-    number = 1
-    while (key := name if number == 1 else f"{name}{number}") in group:
-        value = group[key].get("value", [])
-        values.extend(np.ravel(value).tolist() if isinstance(value, np.ndarray) else value)
-        number += 1
-    return values
-
-
-def _rate(point: dict[str, Any], header: dict[str, Any]) -> float:
-    """Hz: POINT:RATE, or the header's where that is absent; 0 when neither is a rate."""
-    rates = [*_values(point, "RATE")[:1], header["frame_rate"]]
-    for rate in rates:
-        if isinstance(rate, int | float) and math.isfinite(rate) and rate > 0:
-            return float(rate)
-    return 0.0
-
-
-def _first_frame(parameters: dict[str, Any], header: dict[str, Any]) -> int:
-    """Number of frames before the first one of the file: TRIAL:ACTUAL_START_FIELD (two words), or the header's."""
-    words = _values(parameters.get("TRIAL", {}), "ACTUAL_START_FIELD")
-    if words and all(isinstance(word, int | float) and math.isfinite(word) for word in words):
-        low, high = int(words[0]) & 0xFFFF, int(words[1]) & 0xFFFF if len(words) > 1 else 0
-        first = low + (high << 16)
-        if first >= 1:
-            return first - 1
-    return max(0, int(header["first_frame"]))
-
-
-def read_c3d(path: str | PathLike[str], *, unit: str | None = None) -> Take:
-    """Read a C3D file.
+def open_c3d(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
+    """Open a C3D file; its frames are read when they are asked for.
 
     A point is missing where its residual is negative, where its coordinates are not finite, or where all three are
-    exactly zero (several exporters write that instead of a residual). Unlabelled points (`*12`) and points that are
-    missing throughout are ignored with a note. Time 0 is frame 1 of the trial, so a file cut from a longer one
-    starts later.
+    exactly zero (several exporters write that instead of a residual). Unlabelled points (`*12`) are ignored with a
+    note. Time 0 is frame 1 of the trial, so a file cut from a longer one starts later.
 
     Parameters
     ----------
@@ -78,47 +43,74 @@ def read_c3d(path: str | PathLike[str], *, unit: str | None = None) -> Take:
         The file is no whole C3D file, has no points or no rate, or its unit is unknown.
     """
     file = Path(path)
-    check_structure(file)
-    import ezc3d
-
-    try:
-        content = ezc3d.c3d(str(file))
-    except Exception as error:  # ezc3d lets C++ errors of every kind through
-        raise SignfaceError("is a C3D file that cannot be read", file=file, hint="export it again") from error
-    parameters, header = content["parameters"], content["header"]["points"]
-    point = parameters["POINT"]
-    points = content["data"]["points"]  # (4, M, F)
-    if points.size == 0:
-        raise SignfaceError("the C3D file has no points", file=file, hint="export the trajectories with it")
-    rate = _rate(point, header)
-    if rate == 0:
+    structure = read_structure(file)
+    if structure.rate == 0:
         raise SignfaceError("the C3D file has the rate 0", file=file, hint="set POINT:RATE to its frames per second")
-    labels = [str(label) for label in _values(point, "LABELS")]
-    labels += [""] * (points.shape[1] - len(labels))
-    kept, names, notes = clean_labels(labels[: points.shape[1]])
+    labels = structure.labels + [""] * (structure.points - len(structure.labels))
+    kept, names, notes = clean_labels(labels[: structure.points])
     if not kept:
         raise SignfaceError("none of the points in the C3D file has a label", file=file, hint="label the markers")
-    positions = np.ascontiguousarray(points[:3, kept].transpose(2, 1, 0))
-    residuals = content["data"]["meta_points"]["residuals"]
-    missing = residuals[0][kept].T < 0 if residuals.size else np.zeros(positions.shape[:2], dtype=bool)
-    missing |= (positions == 0).all(axis=2)
-    positions[missing] = np.nan
-    units = [str(word) for word in _values(point, "UNITS")]
+    units = structure.units
+    if len(units) > 1:
+        units = [*units, *[units[-1]] * (structure.points - len(units))]
+        units = [units[index] for index in kept]
+
+    def raw(begin: int, end: int, step: int = 1) -> np.ndarray:
+        return _frames(file, structure, kept, begin, end, step)
+
+    sample = partial(raw, 0, structure.frames, max(1, structure.frames // SAMPLE))
     try:
-        if len(units) > 1:
-            units += [units[-1]] * (points.shape[1] - len(units))
-            units = [units[index] for index in kept]
-        positions, note = to_millimetres(positions, units, unit)
+        factor, note = unit_factor(units, unit, markers=len(kept), sample=sample)
     except SignfaceError as error:
         raise SignfaceError(error.problem, file=file, hint=error.hint) from error
-    return Take(
-        positions,
+    return TakeFile(
         tuple(names),
-        rate,
-        start=_first_frame(parameters, header) / rate,
+        structure.rate,
+        structure.frames,
+        lambda begin, end, step: raw(begin, end, step) * factor,
+        start=structure.first / structure.rate,
         name=file.stem,
         history=(f"read {file.name} (C3D)", note, *notes),
     )
+
+
+def _frames(file: Path, structure: Structure, kept: list[int], begin: int, end: int, step: int) -> np.ndarray:
+    """(K, M, 3) coordinates of some frames, as the file has them; NaN where a point is missing."""
+    kind = np.dtype(structure.order + ("f4" if structure.scale < 0 else "i2"))
+    width = structure.words * kind.itemsize
+    try:
+        with file.open("rb") as stream:
+            if step == 1:
+                stream.seek(structure.offset + begin * width)
+                content = stream.read((end - begin) * width)
+            else:
+                parts = []
+                for frame in range(begin, end, step):
+                    stream.seek(structure.offset + frame * width)
+                    parts.append(stream.read(width))
+                content = b"".join(parts)
+    except OSError as error:
+        raise SignfaceError(f"cannot be read ({error.strerror})", file=file) from error
+    frames = len(range(begin, end, step))
+    if len(content) < frames * width:
+        raise SignfaceError("has become shorter while it was read", file=file, hint="wait until it is written")
+    if structure.dec and structure.scale < 0:
+        words = np.frombuffer(content, dtype="<u2").reshape(frames, -1, 2)[:, : 4 * structure.points, ::-1]
+        numbers = np.ascontiguousarray(words).view("<f4").reshape(frames, structure.points, 4) / 4
+    else:
+        numbers = np.frombuffer(content, dtype=kind).reshape(frames, -1)[:, : 4 * structure.points]
+        numbers = numbers.reshape(frames, structure.points, 4)
+    numbers = numbers[:, kept]
+    positions = numbers[..., :3].astype(np.float64)
+    if structure.scale > 0:
+        positions *= structure.scale
+    positions[(numbers[..., 3] < 0) | (positions == 0).all(axis=2)] = np.nan
+    return positions
+
+
+def read_c3d(path: str | PathLike[str], *, unit: str | None = None) -> Take:
+    """All of a C3D file in memory; see `open_c3d`."""
+    return open_c3d(path, unit=unit).whole()
 
 
 def write_c3d(take: Take, path: str | PathLike[str]) -> None:

@@ -1,8 +1,9 @@
-"""Whether a C3D file is whole, looked at before ezc3d opens it.
+"""The structure of a C3D file: what it declares, and whether all of that lies inside it.
 
-ezc3d trusts the counts and offsets that a file declares, and can crash the whole process on a damaged one. This
-walks the header and the parameter section by the C3D User Guide (c3d.org) and checks that everything declared lies
-inside the file.
+- `read_structure`: walks the header and the parameter section by the C3D User Guide (c3d.org).
+- `Structure`: the parameters, and where the frames are and how they are written.
+
+Nothing that a file declares is trusted before it is checked: a damaged file is refused, and can do no harm.
 """
 
 from __future__ import annotations
@@ -22,7 +23,10 @@ DEC = 85
 #: Processor byte of the parameter section: Intel (little endian), DEC (VAX floats), SGI/MIPS (big endian).
 BYTE_ORDER = {84: "<", DEC: "<", 86: ">"}
 
-#: Numbers that ezc3d takes the first value of without looking whether there is one.
+#: Frames are counted in 16 bits in the header; longer takes have their length among the parameters.
+MOST_FRAMES = 65535
+
+#: Parameters that are numbers, and not empty, in every whole file that has them.
 NEEDED = {
     "POINT": ("USED", "SCALE", "RATE", "FRAMES"),
     "ANALOG": ("USED", "RATE", "GEN_SCALE"),
@@ -35,6 +39,45 @@ class _Parameter:
     kind: int  # CHARACTERS, 1 bytes, 2 16-bit integers, 4 32-bit floats
     dimensions: tuple[int, ...]
     content: bytes
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What a whole C3D file declares.
+
+    Parameters
+    ----------
+    points, frames : int
+        How many there are.
+    first : int
+        Number of frames of the trial before the first one of the file.
+    rate : float
+        Frames per second by POINT:RATE, or by the header where that is absent; 0 when neither is a rate.
+    labels, units : list of str
+        POINT:LABELS and POINT:UNITS with their continuations; they may be fewer than the points.
+    offset : int
+        The byte at which the data begin.
+    words : int
+        Numbers in a frame: four for each point, then the analog samples.
+    scale : float
+        Positive: coordinates are 16-bit integers, to be multiplied by it; negative: they are 32-bit floats.
+    order : str
+        `<` or `>`, the order of bytes.
+    dec : bool
+        Whether floats are DEC's: words swapped, and four times as large.
+    """
+
+    points: int
+    frames: int
+    first: int
+    rate: float
+    labels: list[str]
+    units: list[str]
+    offset: int
+    words: int
+    scale: float
+    order: str
+    dec: bool
 
 
 def _damaged(file: Path, what: str) -> SignfaceError:
@@ -96,8 +139,8 @@ def _parameter(section: bytes, at: int, name: str, file: Path) -> tuple[_Paramet
     return _Parameter(kind, dimensions, section[begin:end]), end
 
 
-def check_structure(file: Path) -> None:
-    """Check that a file is a C3D file whose header, parameters and data lie inside it.
+def read_structure(file: Path) -> Structure:
+    """What a C3D file declares, once it is known that its header, parameters and data lie inside it.
 
     Raises
     ------
@@ -127,7 +170,7 @@ def check_structure(file: Path) -> None:
             parameter = groups.get(group, {}).get(name)
             if parameter is not None and (not parameter.content or parameter.kind not in (2, 4)):
                 raise _damaged(file, f"{group}:{name} is empty or no number")
-    _check_data(file, size, header, groups, _Numbers(order, dec=section[3] == DEC))
+    return _checked(file, size, header, groups, _Numbers(order, dec=section[3] == DEC))
 
 
 @dataclass(frozen=True)
@@ -155,19 +198,53 @@ class _Numbers:
         return float(self.word(parameter.content)) if parameter.kind == 2 else self.real(parameter.content)
 
 
-def _values(group: dict[str, _Parameter], name: str) -> int:
-    """How many values a parameter and its continuations (`SCALE2`, ...) hold."""
-    total, number = 0, 1
-    while (parameter := group.get(name if number == 1 else f"{name}{number}")) is not None:
-        total += math.prod(parameter.dimensions)
-        number += 1
-    return total
+def _parts(group: dict[str, _Parameter], name: str) -> list[_Parameter]:
+    """A parameter and its continuations (`LABELS`, `LABELS2`, ...: 255 entries each at most)."""
+    parts: list[_Parameter] = []
+    while (parameter := group.get(f"{name}{len(parts) + 1}" if parts else name)) is not None:
+        parts.append(parameter)
+    return parts
 
 
-def _check_data(
+def _count(group: dict[str, _Parameter], name: str) -> int:
+    """How many values a parameter and its continuations hold."""
+    return sum(math.prod(parameter.dimensions) for parameter in _parts(group, name))
+
+
+def _texts(group: dict[str, _Parameter], name: str) -> list[str]:
+    """The texts of a parameter and its continuations."""
+    texts = []
+    for parameter in _parts(group, name):
+        if parameter.kind != CHARACTERS:
+            continue
+        width = parameter.dimensions[0]
+        for at in range(0, len(parameter.content), max(width, 1)):
+            entry = parameter.content[at : at + width]
+            try:
+                text = entry.decode("utf-8")
+            except UnicodeDecodeError:
+                text = entry.decode("latin-1")
+            texts.append(text.partition("\0")[0].strip())
+    return texts
+
+
+def _field(trial: dict[str, _Parameter], name: str, numbers: _Numbers) -> int:
+    """A frame number of TRIAL, in two words with the lower one first; 0 when there is none."""
+    parameter = trial.get(name)
+    if parameter is None or parameter.kind not in (2, 4) or not parameter.content:
+        return 0
+    size = abs(parameter.kind)
+    ends = range(size, len(parameter.content) + 1, size)[:2]
+    values = [numbers.first(_Parameter(parameter.kind, (), parameter.content[end - size : end])) for end in ends]
+    if not all(math.isfinite(value) for value in values):
+        return 0
+    return (int(values[0]) & 0xFFFF) + ((int(values[1]) & 0xFFFF) << 16 if len(values) > 1 else 0)
+
+
+def _checked(
     file: Path, size: int, header: bytes, groups: dict[str, dict[str, _Parameter]], numbers: _Numbers
-) -> None:
-    """Check that the data section has room for the frames, points and analog samples that are declared."""
+) -> Structure:
+    """The structure, when the data section has room for the frames, points and analog samples that are declared."""
     points, analog_in_header, first, last = (numbers.word(header, at) for at in (2, 4, 6, 8))
     scale, data_block = numbers.real(header, 12), numbers.word(header, 16)
     point, analog = groups["POINT"], groups.get("ANALOG", {})
@@ -183,20 +260,38 @@ def _check_data(
     channels = numbers.first(analog.get("USED"))
     if not (math.isfinite(rate) and math.isfinite(analog_rate) and 0 <= ratio <= 65535 and 0 <= channels <= 65535):
         raise _damaged(file, "its rates are not numbers")
-    if channels and min(_values(analog, "SCALE"), _values(analog, "OFFSET")) < channels:
+    if channels and min(_count(analog, "SCALE"), _count(analog, "OFFSET")) < channels:
         raise _damaged(file, f"its {channels:g} analog channels have no scale or no offset")
     frames = last - first + 1 if first else last
     declared = numbers.first(point.get("FRAMES"))
-    if 0 < declared < 65535 or (declared > 65535 and declared == int(declared)):
+    trial = groups.get("TRIAL", {})
+    start, end = (_field(trial, name, numbers) for name in ("ACTUAL_START_FIELD", "ACTUAL_END_FIELD"))
+    if 0 < declared < MOST_FRAMES or (declared > MOST_FRAMES and declared == int(declared)):
         frames = int(declared)
+    elif last == MOST_FRAMES and end - start + 1 > frames and start >= 1:
+        frames = end - start + 1
     if frames < 1:
         raise SignfaceError("the C3D file has no frames", file=file, hint="export the trajectories with it")
     word = 4 if scale < 0 else 2
-    frame = (points * 4 + max(analog_in_header, int(channels) * int(ratio))) * word
-    room = size - (data_block - 1) * BLOCK
-    if room < frames * frame:
-        raise _damaged(file, f"it ends after {max(0, room // frame)} of {frames} frames")
+    words = points * 4 + (round(channels * ratio) if "USED" in analog else analog_in_header)
+    offset = (data_block - 1) * BLOCK
+    if size - offset < frames * words * word:
+        raise _damaged(file, f"it ends after {max(0, (size - offset) // (words * word))} of {frames} frames")
     _check_rotations(file, size, groups.get("ROTATION", {}), numbers, frames)
+    rates = [*([rate] if "RATE" in point else []), numbers.real(header, 20)]
+    return Structure(
+        points=points,
+        frames=frames,
+        first=start - 1 if start >= 1 else max(0, first - 1),
+        rate=next((value for value in rates if math.isfinite(value) and value > 0), 0.0),
+        labels=_texts(point, "LABELS"),
+        units=_texts(point, "UNITS"),
+        offset=offset,
+        words=words,
+        scale=scale,
+        order=numbers.order,
+        dec=numbers.dec,
+    )
 
 
 def _check_rotations(file: Path, size: int, group: dict[str, _Parameter], numbers: _Numbers, frames: int) -> None:

@@ -106,7 +106,8 @@ def read_livelink(path: str | PathLike[str]) -> Descriptors:
         raise SignfaceError("the file has no frames, only a header", file=file, hint="export it again")
     rows = [line.split(separator, 1) for line in lines[1:]]
     frame, rate = _frames([row[0] for row in rows], file)
-    values = numbers([row[1] if len(row) > 1 else "" for row in rows], len(columns) - 1, separator, file, 2)
+    cells = [(number, row[1]) for number, row in enumerate(rows, start=2) if len(row) > 1 and row[1].strip()]
+    values = numbers(cells, len(columns) - 1, separator, file)
     if len(values) != len(frame):
         raise SignfaceError("a row has a timecode and nothing else", file=file, hint="the file may be cut short")
     kept = np.flatnonzero(np.diff(frame, prepend=-1) > 0)

@@ -16,12 +16,15 @@ import numpy as np
 
 from signface.errors import SignfaceError
 from signface.takes.labels import clean_labels
+from signface.takes.recording import TakeFile
 from signface.takes.take import Take
-from signface.takes.text import numbers, read_text
-from signface.takes.units import to_millimetres
+from signface.takes.text import TextFile, TextRows, marker_rows
 
 #: The names that open header lines; a line that opens with a number is the first frame.
 HEADER_WORD = re.compile(r"^[A-Z][A-Z_]+$")
+
+#: Lines within which a header ends; events are a line each.
+LONGEST_HEADER = 1000
 
 
 def _header(lines: list[str]) -> tuple[dict[str, list[str]], int]:
@@ -36,18 +39,20 @@ def _header(lines: list[str]) -> tuple[dict[str, list[str]], int]:
     return fields, len(lines)
 
 
-def read_qtm(path: str | PathLike[str], *, unit: str | None = None) -> Take:
-    """Read a TSV file of Qualisys Track Manager with 3-D data and its header.
+def open_qtm(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
+    """Open a TSV file of Qualisys Track Manager with 3-D data and its header; frames are read when asked for.
 
     A marker is missing where its cells are empty, not finite, or all exactly zero (QTM's way of writing gaps).
 
     Raises
     ------
     SignfaceError
-        No 3-D data, no marker names, an external time base without a rate, or rows cut short or not numeric.
+        No 3-D data, no marker names, an external time base without a rate, or a first row cut short or not numeric.
+        Later rows are looked at when they are read.
     """
     file = Path(path)
-    lines = read_text(file).splitlines()
+    text = TextFile(file)
+    lines = [line for _, line in text.lines(0, LONGEST_HEADER)]
     fields, length = _header(lines)
     if "MARKER_NAMES" not in fields and "NO_OF_MARKERS" not in fields:
         raise SignfaceError("is no TSV file of Qualisys with its header", file=file, hint="export it with a header")
@@ -82,19 +87,23 @@ def read_qtm(path: str | PathLike[str], *, unit: str | None = None) -> Take:
     filled = next((line for line in rows if line.strip()), "")
     if not before and len(filled.rstrip("\t\r\n ").split("\t")) == 3 * markers + 2:
         before, time_at = 2, 1  # frame and time without a line of column names
-    values = numbers(rows, before + 3 * markers, "\t", file, length + 1)
+    table = TextRows(text, length, before + 3 * markers, "\t")
     kept, labels, notes = clean_labels(names)
     if not kept:
         raise SignfaceError("none of the markers in the TSV file has a label", file=file, hint="label the markers")
-    positions = values[:, before:].reshape(len(values), markers, 3)[:, kept]
-    positions[(positions == 0).all(axis=2)] = np.nan
-    positions, note = to_millimetres(positions, "mm", unit)
-    start = float(values[0, time_at]) if time_at is not None else 0.0
-    return Take(
-        positions,
-        tuple(labels),
+    start = float(table.values(0, 1)[0, time_at]) if time_at is not None else 0.0
+    return marker_rows(
+        table,
+        np.array(kept)[:, None] * 3 + np.arange(before, before + 3),
+        labels,
         rate,
+        units="mm",
+        unit=unit,
         start=start if math.isfinite(start) else 0.0,
-        name=file.stem,
-        history=(f"read {file.name} (Qualisys TSV)", note, *notes),
+        history=(f"read {file.name} (Qualisys TSV)", *notes),
     )
+
+
+def read_qtm(path: str | PathLike[str], *, unit: str | None = None) -> Take:
+    """All of a TSV file in memory; see `open_qtm`."""
+    return open_qtm(path, unit=unit).whole()

@@ -1,6 +1,7 @@
 """Reading a recording, whatever its format.
 
-- `read_recording`: any file this room reads, to a `Take` (markers) or to `Descriptors` (weights).
+- `open_recording`: any file this room reads: a `TakeFile` or `Take` (markers), or `Descriptors` (weights).
+- `read_recording`: the same, all of it in memory.
 - `read_take`: the same, when only markers will do.
 - `recognise`: which format a file has, found from its content.
 """
@@ -14,6 +15,7 @@ from pathlib import Path
 
 from signface.descriptors import Descriptors, is_weights_table, read_weights
 from signface.errors import SignfaceError
+from signface.takes.recording import TakeFile
 from signface.takes.take import Take
 
 FORMATS = {
@@ -109,8 +111,11 @@ def recognise(path: str | PathLike[str]) -> str:
     raise SignfaceError(problem, file=file, hint=f"signface reads {READABLE}")
 
 
-def read_recording(path: str | PathLike[str], *, unit: str | None = None) -> Take | Descriptors:
-    """Read a recording of any known format; the content says which it is, not the ending.
+def open_recording(path: str | PathLike[str], *, unit: str | None = None) -> Take | TakeFile | Descriptors:
+    """Open a recording of any known format; the content says which it is, not the ending.
+
+    Frames of C3D, TRC, TSV and CSV files are read in pieces when they are asked for. A `.pose` file cannot be: it is
+    compressed of one piece in memory, and comes as a `Take`.
 
     Parameters
     ----------
@@ -120,13 +125,52 @@ def read_recording(path: str | PathLike[str], *, unit: str | None = None) -> Tak
 
     Returns
     -------
-    Take or Descriptors
+    Take, TakeFile or Descriptors
         Descriptors for weights: Live Link Face CSV, and the files that `signface solve` writes.
 
     Raises
     ------
     SignfaceError
         The file cannot be read as a recording; the message says why.
+    """
+    file = Path(path)
+    kind = recognise(file)
+    try:
+        if kind == "c3d":
+            from signface.takes.c3d import open_c3d
+
+            return open_c3d(file, unit=unit)
+        if kind == "trc":
+            from signface.takes.trc import open_trc
+
+            return open_trc(file, unit=unit)
+        if kind == "qtm":
+            from signface.takes.qtm import open_qtm
+
+            return open_qtm(file, unit=unit)
+        if kind == "pose":
+            from signface.takes.pose import read_pose
+
+            return read_pose(file, unit=unit)
+        if kind == "table":
+            from signface.takes.table import open_table
+
+            return open_table(file, unit=unit)
+        if kind == "livelink":
+            from signface.takes.livelink import read_livelink
+
+            return read_livelink(file)
+        return read_weights(file)
+    except SignfaceError as error:
+        raise _named(error, file) from error
+
+
+def read_recording(path: str | PathLike[str], *, unit: str | None = None) -> Take | Descriptors:
+    """Read all of a recording into memory; parameters and errors are those of `open_recording`.
+
+    Returns
+    -------
+    Take or Descriptors
 
     Examples
     --------
@@ -134,38 +178,18 @@ def read_recording(path: str | PathLike[str], *, unit: str | None = None) -> Tak
     >>> take.n_frames, take.rate  # doctest: +SKIP
     (12000, 200.0)
     """
-    file = Path(path)
-    kind = recognise(file)
+    recording = open_recording(path, unit=unit)
+    if not isinstance(recording, TakeFile):
+        return recording
     try:
-        if kind == "c3d":
-            from signface.takes.c3d import read_c3d
-
-            return read_c3d(file, unit=unit)
-        if kind == "trc":
-            from signface.takes.trc import read_trc
-
-            return read_trc(file, unit=unit)
-        if kind == "qtm":
-            from signface.takes.qtm import read_qtm
-
-            return read_qtm(file, unit=unit)
-        if kind == "pose":
-            from signface.takes.pose import read_pose
-
-            return read_pose(file, unit=unit)
-        if kind == "table":
-            from signface.takes.table import read_table
-
-            return read_table(file, unit=unit)
-        if kind == "livelink":
-            from signface.takes.livelink import read_livelink
-
-            return read_livelink(file)
-        return read_weights(file)
+        return recording.whole()
     except SignfaceError as error:
-        if error.file is not None:
-            raise
-        raise SignfaceError(error.problem, file=file, hint=error.hint) from error  # the error of an object, not a file
+        raise _named(error, Path(path)) from error
+
+
+def _named(error: SignfaceError, file: Path) -> SignfaceError:
+    """The error with the file in it, where it is the error of an object."""
+    return error if error.file is not None else SignfaceError(error.problem, file=file, hint=error.hint)
 
 
 def read_take(path: str | PathLike[str], *, unit: str | None = None) -> Take:

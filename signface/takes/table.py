@@ -1,6 +1,6 @@
 """CSV with one row a frame: `time_s`, then `LABEL_x, LABEL_y, LABEL_z` for each marker.
 
-- `read_table`, `write_table`.
+- `open_table`, `read_table`, `write_table`.
 """
 
 from __future__ import annotations
@@ -10,14 +10,13 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from signface.errors import SignfaceError
 from signface.files import whole_file
 from signface.takes.labels import clean_labels
+from signface.takes.recording import TakeFile
 from signface.takes.take import Take
-from signface.takes.text import even_rate, numbers, read_text
-from signface.takes.units import to_millimetres
+from signface.takes.text import TextFile, TextRows, even_rate, marker_rows
 
 AXES = ("x", "y", "z")
 
@@ -53,8 +52,8 @@ def _markers(columns: list[str], file: Path) -> tuple[list[str], np.ndarray]:
     return [label for label, _ in order], np.array([own for _, own in order])
 
 
-def read_table(path: str | PathLike[str], *, unit: str | None = None) -> Take:
-    """Read a wide CSV (separated by commas, semicolons or tabs): `time_s`, then three columns a marker.
+def open_table(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
+    """Open a wide CSV (separated by commas, semicolons or tabs): `time_s`, then three columns a marker.
 
     Empty cells are missing markers. The unit is inferred from the spread of the markers unless it is given.
 
@@ -64,29 +63,35 @@ def read_table(path: str | PathLike[str], *, unit: str | None = None) -> Take:
         The columns are others, a row is cut short, a cell is no number, or the times do not rise evenly.
     """
     file = Path(path)
-    lines = read_text(file).splitlines()
-    start = next((number for number, line in enumerate(lines) if line.strip()), 0)
-    columns, separator = header_cells(lines[start])
+    text = TextFile(file)
+    columns, separator = header_cells(text.lines(0, 1)[0][1])
     if not columns or columns[0].lower() not in ("time_s", "time", "time (s)"):
         raise SignfaceError("its first column is not time_s", file=file, hint="put the time in seconds there")
     while columns and not columns[-1]:
         columns.pop()
     labels, places = _markers(columns, file)
-    values = numbers(lines[start + 1 :], len(columns), separator, file, start + 2)
-    rate = even_rate(values[:, 0], file)
+    rows = TextRows(text, 1, len(columns), separator)
+    times = rows.column(0)
+    rate = even_rate(times, file)
     kept, names, notes = clean_labels(labels)
     if not kept:
         raise SignfaceError("none of the markers has a label", file=file, hint="label the markers")
-    positions = values[:, places[kept].ravel()].reshape(len(values), len(kept), 3)
-    positions, note = to_millimetres(positions, None, unit)
-    return Take(
-        positions,
-        tuple(names),
+    return marker_rows(
+        rows,
+        places[kept],
+        names,
         rate,
-        start=float(values[0, 0]),
-        name=file.stem,
-        history=(f"read {file.name} (CSV)", note, *notes),
+        units=None,
+        unit=unit,
+        start=float(times[0]),
+        history=(f"read {file.name} (CSV)", *notes),
+        zero_is_missing=False,
     )
+
+
+def read_table(path: str | PathLike[str], *, unit: str | None = None) -> Take:
+    """All of a wide CSV in memory; see `open_table`."""
+    return open_table(path, unit=unit).whole()
 
 
 def write_table(take: Take, path: str | PathLike[str]) -> None:
@@ -97,6 +102,8 @@ def write_table(take: Take, path: str | PathLike[str]) -> None:
     SignfaceError
         The file cannot be written.
     """
+    import pandas as pd
+
     columns = [f"{label}_{axis}" for label in take.labels for axis in AXES]
     table = pd.DataFrame(take.positions.reshape(take.n_frames, -1), columns=columns)
     table.insert(0, "time_s", take.time)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -87,13 +88,11 @@ class Take:
         SignfaceError
             The time lies outside the take.
         """
-        frame = round((seconds - self.start) * self.rate) if np.isfinite(seconds) else -1
-        if not 0 <= frame < self.n_frames:
-            raise SignfaceError(
-                f"{self.name}: the time {seconds:g} s is outside the take",
-                hint=f"give a time from {self.start:.3f} to {self.time[-1]:.3f} s",
-            )
-        return frame
+        return frame_at(self, seconds)
+
+    def frames(self, begin: int, end: int, step: int = 1) -> np.ndarray:
+        """(K, M, 3) positions of every `step`-th frame from `begin` to before `end`."""
+        return self.positions[begin:end:step]
 
     def select(self, labels: Sequence[str]) -> np.ndarray:
         """(F, len(labels), 3) positions of the named markers, in the order asked for.
@@ -112,3 +111,29 @@ class Take:
     def changed(self, operation: str, **fields: object) -> Take:
         """A copy with some fields replaced and `operation` appended to its history."""
         return replace(self, history=(*self.history, operation), **fields)  # type: ignore[arg-type]
+
+
+class _Timed(Protocol):
+    @property
+    def rate(self) -> float: ...
+
+    @property
+    def start(self) -> float: ...
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def n_frames(self) -> int: ...
+
+
+def frame_at(recording: _Timed, seconds: float) -> int:
+    """Index of the frame of a recording that is nearest to a time; see `Take.frame_at`."""
+    frame = round((seconds - recording.start) * recording.rate) if np.isfinite(seconds) else -1
+    if not 0 <= frame < recording.n_frames:
+        last = recording.start + (recording.n_frames - 1) / recording.rate
+        raise SignfaceError(
+            f"{recording.name}: the time {seconds:g} s is outside the take",
+            hint=f"give a time from {recording.start:.3f} to {last:.3f} s",
+        )
+    return frame

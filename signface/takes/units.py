@@ -1,13 +1,13 @@
 """Units of length: every reader turns what it finds into millimetres here.
 
 - `millimetres_per`: the factor of a named unit.
-- `to_millimetres`: positions and the unit a file names (or does not) to millimetres, with a note for the history.
+- `unit_factor`: the factor of the unit that a file names (or does not), with a note for the history.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -26,6 +26,9 @@ MILLIMETRES = {
 
 #: A cloud of markers (on a face, a head or a whole body) is narrower than this in metres, then in centimetres.
 WIDEST_IN_METRES, WIDEST_IN_CENTIMETRES = 4.0, 45.0
+
+#: Some so many frames, evenly taken, tell the width of the cloud.
+SAMPLE = 300
 
 
 def millimetres_per(unit: str) -> float:
@@ -48,19 +51,18 @@ def extent(positions: np.ndarray) -> float:
     Parameters
     ----------
     positions : (F, M, 3) array
-        NaN where a marker is missing. At most some 300 frames, evenly taken, are looked at.
+        NaN where a marker is missing.
 
     Returns
     -------
     float
         NaN when no frame shows two markers.
     """
-    sample = positions[:: max(1, len(positions) // 300)]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # frames without any marker
-        sides = np.nanmax(sample, axis=1, initial=-np.inf) - np.nanmin(sample, axis=1, initial=np.inf)
+        sides = np.nanmax(positions, axis=1, initial=-np.inf) - np.nanmin(positions, axis=1, initial=np.inf)
     diagonals = np.linalg.norm(sides, axis=1)
-    seen = (np.isfinite(sample).all(axis=2).sum(axis=1) > 1) & np.isfinite(diagonals)
+    seen = (np.isfinite(positions).all(axis=2).sum(axis=1) > 1) & np.isfinite(diagonals)
     return float(np.median(diagonals[seen])) if seen.any() else float("nan")
 
 
@@ -76,23 +78,30 @@ def inferred_unit(positions: np.ndarray) -> str:
     return "m" if width < WIDEST_IN_METRES else "cm" if width < WIDEST_IN_CENTIMETRES else "mm"
 
 
-def to_millimetres(
-    positions: np.ndarray, found: str | Sequence[str] | None, given: str | None = None
-) -> tuple[np.ndarray, str]:
-    """Positions in millimetres, and a note that says from which unit.
+def unit_factor(
+    found: str | Sequence[str] | None,
+    given: str | None,
+    *,
+    markers: int,
+    sample: Callable[[], np.ndarray],
+) -> tuple[float | np.ndarray, str]:
+    """What positions are to be multiplied with to be millimetres, and a note that says from which unit.
 
     Parameters
     ----------
-    positions : (F, M, 3) array
-    found : str or (M,) sequence of str, optional
+    found : str or sequence of str, optional
         The unit that the file names: one for all, or one for each marker. Empty or None when it names none.
     given : str, optional
         The unit that the user gives; it has the last word.
+    markers : int
+        How many there are.
+    sample : callable
+        Gives (F, M, 3) positions of some frames, in the file's unit, from whose width it is inferred.
 
     Returns
     -------
-    ((F, M, 3) array, str)
-        Positions in millimetres; "unit m", "unit mm (given)" or "unit mm (not in the file, from the spread)".
+    (float or (M, 1) array, str)
+        The factor; "unit m", "unit mm (given)" or "unit mm (not in the file, from the spread)".
 
     Raises
     ------
@@ -100,17 +109,16 @@ def to_millimetres(
         A unit is not one of length.
     """
     if given is not None:
-        return positions * millimetres_per(given), f"unit {given} (given)"
+        return millimetres_per(given), f"unit {given} (given)"
     units = [found] if isinstance(found, str) else list(found or ())
     units = [unit.strip() for unit in units]
     named = [unit for unit in units if unit]
     if not named:
-        unit = inferred_unit(positions)
-        return positions * millimetres_per(unit), f"unit {unit} (not in the file, from the spread of the markers)"
+        unit = inferred_unit(sample())
+        return millimetres_per(unit), f"unit {unit} (not in the file, from the spread of the markers)"
     if len(units) == 1 or len(set(unit.lower() for unit in named)) == 1:
-        return positions * millimetres_per(named[0]), f"unit {named[0]}"
-    markers = positions.shape[1]
+        return millimetres_per(named[0]), f"unit {named[0]}"
     each = [unit or named[0] for unit in units[:markers]]
     each += [each[-1]] * (markers - len(each))
     factors = np.array([millimetres_per(unit) for unit in each])
-    return positions * factors[:, None], f"unit {', '.join(sorted(set(each)))} (one per marker)"
+    return factors[:, None], f"unit {', '.join(sorted(set(each)))} (one per marker)"

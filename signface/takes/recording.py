@@ -1,0 +1,105 @@
+"""A recording that need not lie in memory: its markers, rate and length, and its frames in pieces.
+
+- `Recording`: what a `Take` and a `TakeFile` share, and all that cleaning and solving ask of either.
+- `TakeFile`: a recording on disk, of which only the frames asked for are read.
+- `pieces`: the pieces in which a long recording is worked through.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from signface.takes.take import Take, frame_at
+
+#: Frames worked on at a time: 46 markers then take 18 MB, and the two minutes of an ordinary take are two pieces.
+PIECE = 16384
+
+
+class Recording(Protocol):
+    """Trajectories of markers, in memory or on disk; attributes as of `Take`."""
+
+    @property
+    def labels(self) -> tuple[str, ...]: ...
+
+    @property
+    def rate(self) -> float: ...
+
+    @property
+    def start(self) -> float: ...
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def history(self) -> tuple[str, ...]: ...
+
+    @property
+    def n_frames(self) -> int: ...
+
+    def frames(self, begin: int, end: int, step: int = 1) -> np.ndarray:
+        """(K, M, 3) positions of every `step`-th frame from `begin` to before `end`, millimetres, NaN where missing."""
+        ...
+
+
+@dataclass(frozen=True)
+class TakeFile:
+    """A recording on disk.
+
+    Parameters
+    ----------
+    labels, rate, start, name, history
+        As of `Take`.
+    n_frames : int
+    read : callable
+        `read(begin, end, step)` gives the positions of these frames, millimetres, NaN where missing.
+    """
+
+    labels: tuple[str, ...]
+    rate: float
+    n_frames: int
+    read: Callable[[int, int, int], np.ndarray]
+    start: float = 0.0
+    name: str = "take"
+    history: tuple[str, ...] = ()
+
+    def frames(self, begin: int, end: int, step: int = 1) -> np.ndarray:
+        """(K, M, 3) positions of every `step`-th frame from `begin` to before `end`, read now.
+
+        Raises
+        ------
+        SignfaceError
+            The file cannot be read there: a row is cut short or holds words.
+        """
+        positions = self.read(begin, end, step)
+        positions[~np.isfinite(positions).all(axis=2)] = np.nan
+        return positions
+
+    def frame_at(self, seconds: float) -> int:
+        """Index of the frame nearest to a time in seconds; see `Take.frame_at`."""
+        return frame_at(self, seconds)
+
+    def whole(self) -> Take:
+        """All of it, in memory."""
+        return Take(
+            self.frames(0, self.n_frames),
+            self.labels,
+            self.rate,
+            start=self.start,
+            name=self.name,
+            history=self.history,
+        )
+
+
+def pieces(frames: int, length: int = PIECE) -> list[tuple[int, int]]:
+    """First frame, and frame after the last, of consecutive pieces of at most `length` frames.
+
+    Examples
+    --------
+    >>> pieces(10, 4)
+    [(0, 4), (4, 8), (8, 10)]
+    """
+    return [(begin, min(begin + length, frames)) for begin in range(0, frames, length)]
