@@ -12,9 +12,10 @@ from sklearn.model_selection import GridSearchCV
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
+from signface.label.examples import Example, training_frames
 from signface.label.labellers import NAMES, make_labeller
 from signface.label.labelling import label_spans
-from signface.label.training import Example, score_by_take, train_model, training_frames
+from signface.label.training import train_model
 from signface.segment.segments import Segments
 from tests.hand_made import BASES, corpus, example
 
@@ -138,7 +139,7 @@ def test_a_reference_without_labels_is_refused():
 
 
 def test_left_out_takes_are_scored_and_noise_scores_near_chance(takes):
-    (score,) = score_by_take(takes, classifier="knn3").values()
+    score, _ = train_model(takes, classifier="knn3", calibrate=True).card.scores.values()
     assert score > 0.95
     rng = np.random.default_rng(0)
     noisy = [
@@ -151,5 +152,5 @@ def test_left_out_takes_are_scored_and_noise_scores_near_chance(takes):
         )
         for e in takes
     ]
-    (score,) = score_by_take(noisy, classifier="knn3").values()
+    score, _ = train_model(noisy, classifier="knn3", calibrate=True).card.scores.values()
     assert score < 0.75  # neutral is 60 % of the segments

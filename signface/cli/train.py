@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from signface.cli.options import add_face_arguments
 from signface.cli.progress import progress
@@ -11,12 +12,49 @@ from signface.errors import SignfaceError
 from signface.label.labellers import NAMES, SEQUENCE_NAMES
 
 EXAMPLE = """  signface train corpora/feel -o mine.skops
-  signface train corpora/feel -o mine.skops --classifier svm-rbf --kinds IE,SE --signer each"""
+  signface train corpora/feel -o mine.skops --classifier svm-rbf --kinds IE,SE --signer each
+  signface train corpora/feel -o mine.skops --normalise signer --features weights,windows --search"""
 
 
 def words(text: str) -> list[str]:
     """The words of a list with commas; for argparse."""
     return [word.strip() for word in text.split(",") if word.strip()]
+
+
+def add_training_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what `train` and `evaluate` can be told of how classifiers are trained."""
+    parser.add_argument(
+        "--features",
+        type=words,
+        default=["weights"],
+        metavar="NAMES",
+        help="what classifiers of segments see: weights (the default), derivatives, windows, or several of them",
+    )
+    parser.add_argument(
+        "--normalise",
+        default="none",
+        choices=("none", "signer"),
+        help="signer: weights less the signer's mean, over their spread, from all takes of the signer at hand",
+    )
+    parser.add_argument(
+        "--aggregate",
+        default="mean",
+        choices=("mean", "frames"),
+        help="label a segment by its mean descriptor (default, as in the thesis) or by all of its frames",
+    )
+    parser.add_argument("--balanced", action="store_true", help="let every label weigh the same in training")
+    parser.add_argument(
+        "--search", action="store_true", help="look for the best parameters, by folds of the training takes"
+    )
+
+
+def training_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What `signface.label.training.train_model` is told of `add_training_arguments`; names are checked."""
+    from signface.label.variants import DescriptorVariant
+
+    DescriptorVariant(arguments.features, arguments.normalise).check()
+    names = ("features", "normalise", "aggregate", "balanced", "search")
+    return {name: getattr(arguments, name) for name in names}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,6 +69,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="one signer, all of them together (default), or each: one classifier a signer, MODEL-NAME.skops",
     )
+    add_training_arguments(parser)
+    parser.add_argument(
+        "--calibrate",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="train on parts of the takes too, to score the rest and to calibrate confidences (default: yes)",
+    )
     parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")
     add_face_arguments(parser)
 
@@ -40,11 +85,12 @@ def run(arguments: argparse.Namespace) -> None:
     from signface.corpus.examples import solve_examples
     from signface.corpus.manifest import read_corpus
     from signface.label.persistence import save_model
-    from signface.label.training import score_by_take, train_model
+    from signface.label.training import train_model
 
     output = arguments.output
     if output.suffix.lower() != ".skops":
         raise SignfaceError("the ending of a classifier is .skops", file=output)
+    options = training_options(arguments)
     whole = read_corpus(arguments.corpus)
     one = None if arguments.signer in ("all", "each") else [arguments.signer]
     corpus = whole.select(kinds=arguments.kinds, signers=one)
@@ -62,15 +108,15 @@ def run(arguments: argparse.Namespace) -> None:
             for signer in sorted({example.signer for example in examples})
         }
     for file, group in groups.items():
-        scores = score_by_take(group, classifier=arguments.classifier, seed=arguments.seed)
         model = train_model(
             group,
             classifier=arguments.classifier,
             seed=arguments.seed,
+            calibrate=arguments.calibrate,
+            **options,
             face=Path(arguments.face).name,
             layout="chosen by markers" if arguments.layout is None else Path(arguments.layout).name,
             corpus=whole.folder.resolve().name,
-            scores=scores,
             name=file.stem,
         )
         save_model(model, file)
@@ -79,5 +125,12 @@ def run(arguments: argparse.Namespace) -> None:
             f"{file}: {card.classifier}, {len(card.takes)} takes ({', '.join(card.kinds)}) of "
             f"{', '.join(card.signers)}, {card.frames} frames, labels {' '.join(card.labels)}"
         )
-        for what, score in scores.items():
+        for what, score in card.scores.items():
             print(f"  {what}: {score:.2f}")
+        if card.parameters:
+            print(f"  chosen: {', '.join(f'{key} {value}' for key, value in card.parameters.items())}")
+        if card.calibration:
+            before, after = card.calibration["ece_before"], card.calibration["ece_after"]
+            print(f"  expected calibration error there: {before:.3f}, calibrated {after:.3f}")
+        if model.intensity is not None:
+            print(f"  intensity: learnt from {model.intensity.n_segments_} segments")

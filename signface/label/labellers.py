@@ -6,7 +6,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from signface.errors import SignfaceError
 
@@ -27,18 +28,25 @@ SEQUENCE_NAMES = {
     "net-hsmm": "neural network on frames, decoded by a hidden semi-Markov model",
     "forest-viterbi": "random forest on frames, decoded by Viterbi's algorithm through a transition state",
     "hmm": "hidden Markov model with Gaussian frames",
+    "crf": "linear-chain conditional random field",
+    "gru": "recurrent network, decoded by a hidden semi-Markov model (extra deep)",
 }
 
 
-def make_labeller(name: str, *, seed: int = 0) -> BaseEstimator:
+def make_labeller(
+    name: str, *, seed: int = 0, balanced: bool = False, parameters: Mapping[str, Any] | None = None
+) -> BaseEstimator:
     """A new estimator with `fit`, `predict` and `predict_proba`, which scikit-learn can clone and search over.
 
-    - `knn1`, `knn3`: Euclidean distance between the weights as they are: a base that hardly moves in the corpus
-      should not weigh as much as one that moves much.
-    - `svm-linear`, `svm-rbf`: C = 1 on weights scaled to unit variance. Their probabilities are Platt's, fitted on
-      three folds of consecutive training frames (neighbouring frames are nearly equal, so that shuffled folds would
-      tell the machine about its own test frames).
+    - `knn1`, `knn3`: Euclidean distance between the weights.
+    - `svm-linear`, `svm-rbf`: C = 1. Their probabilities are Platt's, fitted on three folds of consecutive training
+      frames (neighbouring frames are nearly equal, so that shuffled folds would tell the machine about its own test
+      frames).
     - `forest`: 150 trees of at most 12 levels, with at least 3 frames in a leaf, which keeps a saved model small.
+
+    All take the weights as they are. They have one unit (0 at rest, 1 fully active), and a base that hardly moves in
+    the training takes must not weigh as much as one that moves much: scaled to unit variance, its noise would drown
+    the rest as soon as somebody else signs.
 
     Parameters
     ----------
@@ -46,31 +54,46 @@ def make_labeller(name: str, *, seed: int = 0) -> BaseEstimator:
         One of `NAMES`.
     seed : int
         Seed of the forest; the others draw nothing.
+    balanced : bool
+        Let every label weigh the same, however often it occurs. Nearest neighbours have no weights:
+        `signface.label.training` gives them equally many frames of each.
+    parameters : mapping, optional
+        Parameters of the classifier (of the machine itself, for those with calibrated probabilities) to set.
 
     Raises
     ------
     SignfaceError
-        There is no classifier of that name.
+        There is no classifier of that name, or it has no such parameter.
     """
+    weight = "balanced" if balanced else None
+    estimator: Any
     if name in ("knn1", "knn3"):
         from sklearn.neighbors import KNeighborsClassifier
 
-        return KNeighborsClassifier(n_neighbors=int(name[-1]), algorithm="brute")
-    if name in ("svm-linear", "svm-rbf"):
-        from sklearn.calibration import CalibratedClassifierCV
-        from sklearn.model_selection import StratifiedKFold
-        from sklearn.pipeline import make_pipeline
-        from sklearn.preprocessing import StandardScaler
+        estimator = KNeighborsClassifier(n_neighbors=int(name[-1]), algorithm="brute")
+    elif name in ("svm-linear", "svm-rbf"):
         from sklearn.svm import SVC
 
-        machine = SVC(kernel=name.removeprefix("svm-"), C=1.0)
-        return make_pipeline(
-            StandardScaler(), CalibratedClassifierCV(machine, ensemble=False, cv=StratifiedKFold(3, shuffle=False))
-        )
-    if name == "forest":
+        estimator = SVC(kernel=name.removeprefix("svm-"), C=1.0, class_weight=weight)
+    elif name == "forest":
         from sklearn.ensemble import RandomForestClassifier
 
-        return RandomForestClassifier(n_estimators=150, max_depth=12, min_samples_leaf=3, random_state=seed)
-    raise SignfaceError(
-        f"there is no classifier named {name}", hint=f"choose one of {', '.join(NAMES | SEQUENCE_NAMES)}"
-    )
+        estimator = RandomForestClassifier(
+            n_estimators=150, max_depth=12, min_samples_leaf=3, class_weight=weight, random_state=seed
+        )
+    else:
+        raise SignfaceError(
+            f"there is no classifier named {name}", hint=f"choose one of {', '.join(NAMES | SEQUENCE_NAMES)}"
+        )
+    unknown = sorted(set(parameters or {}) - set(estimator.get_params()))
+    if unknown:
+        raise SignfaceError(
+            f"{name} has no parameter named {unknown[0]}", hint=f"it has {', '.join(estimator.get_params())}"
+        )
+    estimator.set_params(**(parameters or {}))
+    if not name.startswith("svm-"):
+        return estimator
+    from sklearn.calibration import CalibratedClassifierCV
+    from sklearn.model_selection import StratifiedKFold
+
+    return CalibratedClassifierCV(estimator, ensemble=False, cv=StratifiedKFold(3, shuffle=False))

@@ -16,13 +16,17 @@ import pandas as pd
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
-from signface.label.model import TrainedModel, on_bases
+from signface.label.model import TrainedModel
+from signface.label.variants import SignerLevel
 from signface.label.vocabulary import join
 from signface.segment.segmentation import segment
 from signface.segment.segments import Segments
 
 #: Frames per second that the confidence of a segment is averaged over.
 CONFIDENCE_RATE = 25.0
+
+#: The least probability of a frame that counts: one frame alone cannot rule a label out for its segment.
+LEAST = 1e-3
 
 #: How much of a transition at the end of the take stands for the expression outside it (s).
 EDGE_S = 0.05
@@ -46,7 +50,9 @@ def segment_means(descriptors: Descriptors, spans: np.ndarray) -> np.ndarray:
     return means
 
 
-def label_spans(descriptors: Descriptors, spans: np.ndarray, model: TrainedModel) -> tuple[list[str], list[float]]:
+def label_spans(
+    descriptors: Descriptors, spans: np.ndarray, model: TrainedModel, *, level: SignerLevel | None = None
+) -> tuple[list[str], list[float]]:
     """Label and confidence of each span of a take, each judged for itself (see `label_segments`).
 
     Parameters
@@ -55,6 +61,8 @@ def label_spans(descriptors: Descriptors, spans: np.ndarray, model: TrainedModel
     spans : (S, 2) array
         Start and end of each span in seconds.
     model : TrainedModel
+    level : SignerLevel, optional
+        As in `TrainedModel.seen`.
 
     Raises
     ------
@@ -63,37 +71,63 @@ def label_spans(descriptors: Descriptors, spans: np.ndarray, model: TrainedModel
     """
     if len(spans) == 0:
         return [], []
-    if model.sequential:
-        return _most_likely(descriptors, spans, model)
-    columns = model.columns(descriptors)
-    means = segment_means(descriptors, spans)[:, columns]
-    seen = np.isfinite(means).all(axis=1)
-    if not seen.any():
-        raise SignfaceError(f"{descriptors.name}: no segment has weights, so none can be labelled")
-    classes = model.card.labels
-    chosen = np.full(len(spans), -1, dtype=int)
-    chosen[seen] = [classes.index(label) for label in model.estimator.predict(means[seen])]
-    confidences = np.zeros(len(spans))
-    thinned = [_thinned(descriptors, start, end) for start, end in spans]
-    probabilities = model.probabilities(descriptors.weights[np.ix_(np.concatenate(thinned), columns)])
+    judge = _judged_by_frames if model.sequential else _judged_by_rows
+    chosen, shares = judge(model.seen(descriptors, level), np.asarray(spans, dtype=float), model)
+    confidences = model.confidence(shares[np.arange(len(spans)), chosen])
+    confidences[shares.sum(axis=1) == 0] = 0.0  # nothing was seen of the span
+    return [model.card.labels[code] for code in chosen], confidences.tolist()
+
+
+def _judged_by_rows(take: Descriptors, spans: np.ndarray, model: TrainedModel) -> tuple[np.ndarray, np.ndarray]:
+    """Code of the label of each span, and its mean probabilities over the frames, zero where none has weights."""
+    means = segment_means(take, spans)
+    known = np.isfinite(means).all(axis=1)
+    if not known.any():
+        raise SignfaceError(f"{take.name}: no segment has weights, so none can be labelled")
+    thinned = [_thinned(take, start, end) for start, end in spans]
+    probabilities = model.probabilities(take.weights[np.concatenate(thinned)])
+    shares = np.zeros((len(spans), len(model.card.labels)))
+    logs = np.zeros_like(shares)
     offset = 0
     for row, frames in enumerate(thinned):
-        if seen[row]:
-            confidences[row] = probabilities[offset : offset + len(frames), chosen[row]].mean()
+        if known[row]:
+            own = probabilities[offset : offset + len(frames)]
+            shares[row], logs[row] = own.mean(axis=0), np.log(own.clip(LEAST)).mean(axis=0)
         offset += len(frames)
-    nearest = np.flatnonzero(seen)
-    for blind in np.flatnonzero(~seen):  # the expression before goes on, or at the start the one after was there
+    chosen = logs.argmax(axis=1)
+    if model.card.aggregate == "mean":
+        said = model.estimator.predict(means[known])  # type: ignore[attr-defined]
+        chosen[known] = [model.card.labels.index(label) for label in said]
+    nearest = np.flatnonzero(known)
+    for blind in np.flatnonzero(~known):  # the expression before goes on, or at the start the one after was there
         before = nearest[nearest < blind]
         chosen[blind] = chosen[before[-1] if len(before) else nearest[0]]
-    return [classes[index] for index in chosen], confidences.tolist()
+    return chosen, shares
 
 
-def label_segments(descriptors: Descriptors, segments: Segments, model: TrainedModel) -> Segments:
+def _judged_by_frames(take: Descriptors, spans: np.ndarray, model: TrainedModel) -> tuple[np.ndarray, np.ndarray]:
+    """What a sequence model's frames say of each span: the label with the highest mean log probability."""
+    estimator: Any = model.estimator
+    among, times = estimator.label_probabilities(take), estimator.frame_times(take)
+    shares = np.zeros((len(spans), among.shape[1]))
+    logs = np.zeros_like(shares)
+    for row, (start, end) in enumerate(spans):
+        inside = (times >= start) & (times < end)
+        if not inside.any():
+            inside[np.argmin(np.abs(times - (start + end) / 2))] = True
+        shares[row], logs[row] = among[inside].mean(axis=0), np.log(among[inside].clip(LEAST)).mean(axis=0)
+    return logs.argmax(axis=1), shares
+
+
+def label_segments(
+    descriptors: Descriptors, segments: Segments, model: TrainedModel, *, level: SignerLevel | None = None
+) -> Segments:
     """Label the segments of a take.
 
-    A stable segment gets the label that the classifier gives to its mean descriptor (eq. 4.6). Its confidence is the
-    probability of that label averaged over the segment's frames: a face that changes inside a segment, or lies
-    between two expressions, lowers it, whichever the classifier.
+    A stable segment gets the label that the classifier gives to its mean descriptor (eq. 4.6), or to its frames
+    (`signface.label.model.AGGREGATES`). Its confidence is the probability of that label averaged over the segment's
+    frames, calibrated where the model is: a face that changes inside a segment, or lies between two expressions,
+    lowers it, whichever the classifier.
 
     A transition is named by its neighbours (`NA`), and its confidence is the product of theirs, since its name is
     right when both are. Where it comes from or leads to nothing because the take begins or ends in it, the first or
@@ -111,11 +145,14 @@ def label_segments(descriptors: Descriptors, segments: Segments, model: TrainedM
     segments : Segments
         Its segments, from `signface.segment.segmentation.segment`.
     model : TrainedModel
+    level : SignerLevel, optional
+        As in `TrainedModel.seen`.
 
     Returns
     -------
     Segments
-        With the columns `label` and `confidence`; neighbours have unequal labels.
+        With the columns `label` and `confidence`, and `intensity` where the model gives it; neighbours have unequal
+        labels.
 
     Raises
     ------
@@ -123,16 +160,18 @@ def label_segments(descriptors: Descriptors, segments: Segments, model: TrainedM
         The model was trained on other bases, or no segment has weights.
     """
     states = _states(segments)
-    labels, confidences = label_spans(descriptors, np.array([state.sample for state in states]), model)
+    samples = np.array([state.sample for state in states])
+    labels, confidences = label_spans(descriptors, samples, model, level=level)
     states = [
         replace(state, label=label, confidence=confidence)
         for state, label, confidence in zip(states, labels, confidences, strict=True)
     ]
     table = _table(_without_repetition(states))
-    return segments.changed(f"label {model.name} ({model.card.classifier})", table)
+    labelled = segments.changed(f"label {model.name} ({model.card.classifier})", table)
+    return labelled if model.intensity is None else model.intensity.annotate(descriptors, labelled)
 
 
-def find_segments(descriptors: Descriptors, model: TrainedModel) -> Segments:
+def find_segments(descriptors: Descriptors, model: TrainedModel, *, level: SignerLevel | None = None) -> Segments:
     """The labelled segments of a take.
 
     A sequence model finds them itself; for the others the take is cut by `signface.segment.segmentation.segment` and
@@ -144,27 +183,17 @@ def find_segments(descriptors: Descriptors, model: TrainedModel) -> Segments:
         The model was trained on other bases, or no frame has weights.
     """
     if not model.sequential:
-        return label_segments(descriptors, segment(descriptors), model)
-    model.columns(descriptors)  # raises where bases are missing
-    found = model.estimator.annotate(on_bases(descriptors, model.card.bases))  # type: ignore[attr-defined]
-    return found.changed(f"find_segments {model.name} ({model.card.classifier})", found.table)
-
-
-def _most_likely(descriptors: Descriptors, spans: np.ndarray, model: TrainedModel) -> tuple[list[str], list[float]]:
-    """What a sequence model's frames say of each span: the label with the highest mean log probability."""
-    model.columns(descriptors)
-    take = on_bases(descriptors, model.card.bases)
-    estimator: Any = model.estimator
-    among, times = estimator.label_probabilities(take), estimator.frame_times(take)
-    labels, confidences = [], []
-    for start, end in spans:
-        inside = (times >= start) & (times < end)
-        if not inside.any():
-            inside[np.argmin(np.abs(times - (start + end) / 2))] = True
-        code = int(np.log(among[inside].clip(1e-3)).mean(axis=0).argmax())
-        labels.append(model.card.labels[code])
-        confidences.append(float(among[inside, code].mean()))
-    return labels, confidences
+        return label_segments(descriptors, segment(descriptors), model, level=level)
+    found = model.estimator.annotate(model.seen(descriptors, level))  # type: ignore[attr-defined]
+    table = found.table.copy()
+    stable = (table["kind"] == "stable").to_numpy()
+    sure = table["confidence"].to_numpy(float).copy()
+    sure[stable] = model.confidence(sure[stable])
+    for row in np.flatnonzero(~stable):  # as sure as both neighbours
+        sure[row] = np.prod([sure[other] for other in (row - 1, row + 1) if 0 <= other < len(sure) and stable[other]])
+    table["confidence"] = sure
+    labelled = found.changed(f"find_segments {model.name} ({model.card.classifier})", table)
+    return labelled if model.intensity is None else model.intensity.annotate(descriptors, labelled)
 
 
 @dataclass(frozen=True)

@@ -4,16 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
+from signface.label.calibration import calibrated
 from signface.label.labellers import SEQUENCE_NAMES
+from signface.label.variants import DescriptorVariant, SignerLevel
 
 if TYPE_CHECKING:
     from sklearn.base import ClassifierMixin
+
+    from signface.label.intensity import IntensityClassifier
+
+
+#: How a segment gets its label. name: what it is.
+AGGREGATES = {
+    "mean": "the label of the segment's mean descriptor (thesis, eq. 4.6)",
+    "frames": "the label with the highest mean log probability over the segment's frames",
+}
 
 
 @dataclass(frozen=True)
@@ -38,6 +49,17 @@ class Card:
         Seed of the training.
     scores : mapping of str to float
         Measured accuracies, each under a name that says on what.
+    features, normalise :
+        Descriptor variant that it sees (`signface.label.variants.DescriptorVariant`).
+    aggregate : str
+        How a segment gets its label: a name of `AGGREGATES`.
+    balanced : bool
+        Whether every label weighed the same in training.
+    parameters : mapping
+        What of the classifier differs from `signface.label.labellers.make_labeller`: what a search chose.
+    calibration : mapping of str to float
+        `slope` and `offset` of the confidence (`signface.label.calibration`), and how it was measured; empty when it
+        is not calibrated.
     version : str
         Version of signface that trained it.
     """
@@ -54,16 +76,32 @@ class Card:
     frames: int = 0
     seed: int = 0
     scores: Mapping[str, float] = field(default_factory=dict)
+    features: tuple[str, ...] = ("weights",)
+    normalise: str = "none"
+    aggregate: str = "mean"
+    balanced: bool = False
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    calibration: Mapping[str, float] = field(default_factory=dict)
     version: str = ""
 
 
 @dataclass(frozen=True)
 class TrainedModel:
-    """A trained classifier and its card."""
+    """A trained classifier and its card.
+
+    Parameters
+    ----------
+    estimator : classifier of scikit-learn, or SequenceLabeller
+    card : Card
+    name : str
+    intensity : IntensityClassifier, optional
+        What gives stable segments their intensity, where it was trained.
+    """
 
     estimator: ClassifierMixin
     card: Card
     name: str = "model"
+    intensity: IntensityClassifier | None = None
 
     @property
     def sequential(self) -> bool:
@@ -93,8 +131,31 @@ class TrainedModel:
             )
         return np.array([place[name] for name in self.card.bases], dtype=int)
 
+    def seen(self, descriptors: Descriptors, level: SignerLevel | None = None) -> Descriptors:
+        """The columns that the classifier sees of a take: its bases, in the variant it was trained on.
+
+        Parameters
+        ----------
+        descriptors : Descriptors
+        level : SignerLevel, optional
+            What a model that normalises signers normalises by; the level of this take alone when not given.
+
+        Raises
+        ------
+        SignfaceError
+            As `columns`.
+        """
+        self.columns(descriptors)
+        take = on_bases(descriptors, self.card.bases)
+        variant = DescriptorVariant(self.card.features, self.card.normalise)
+        return take if variant.plain else variant.of(take, level)
+
+    def confidence(self, raw: np.ndarray) -> np.ndarray:
+        """The chance of labels to be right, from the mean probabilities that the classifier gives them."""
+        return calibrated(np.asarray(raw, dtype=float), self.card.calibration)
+
     def probabilities(self, weights: np.ndarray) -> np.ndarray:
-        """(K, labels) probability of each of `card.labels` for (K, bases) weights without NaN.
+        """(K, labels) probability of each of `card.labels` for (K, columns) frames of `seen`, without NaN.
 
         A sequence model judges no frame alone: see `SequenceLabeller.frame_probabilities`.
         """

@@ -23,9 +23,13 @@ from signface.errors import SignfaceError
 from signface.files import shipped, whole_file
 from signface.label.labellers import SEQUENCE_NAMES
 from signface.label.model import Card, TrainedModel
+from signface.label.variants import DescriptorVariant
 
 CARD = "signface.json"
 SCHEMA = "schema.json"
+
+#: What a file holds whose model gives intensities beside labels; others hold the labels' estimator alone.
+LABELS, INTENSITY = "labels", "intensity"
 
 #: Types that a file may hold beside the ones skops itself trusts. None of them runs code of the file's choosing.
 TRUSTED = (
@@ -33,7 +37,11 @@ TRUSTED = (
     "sklearn.calibration._SigmoidCalibration",
     "sklearn.model_selection._split.StratifiedKFold",
     "sklearn.tree._tree.Tree",
+    "signface.label.intensity.IntensityClassifier",
+    "signface.label.intensity.OrdinalClassifier",
     "signface.label.sequence.SequenceLabeller",
+    "signface.label.crf.ChainLabeller",
+    "signface.label.gru.RecurrentLabeller",
     "sklearn.ensemble._hist_gradient_boosting.predictor.TreePredictor",
 )
 
@@ -53,7 +61,8 @@ def save_model(model: TrainedModel, path: str | PathLike[str]) -> None:
 
     if Path(path).suffix.lower() != ".skops":
         raise SignfaceError("the ending of a classifier is .skops", file=path)
-    written = skops.io.dumps(model.estimator)
+    both = {LABELS: model.estimator, INTENSITY: model.intensity}
+    written = skops.io.dumps(model.estimator if model.intensity is None else both)
     with zipfile.ZipFile(io.BytesIO(written)) as archive:
         schema, names = _canonical(json.loads(archive.read(SCHEMA)))
         contents = {new: archive.read(old) for old, new in names.items()}
@@ -122,6 +131,9 @@ def load_model(name_or_path: str | PathLike[str] = "default") -> TrainedModel:
                 hint="use only files that signface train wrote",
             )
         estimator: Any = skops.io.loads(data, trusted=list(TRUSTED))
+        intensity = None
+        if isinstance(estimator, dict):
+            estimator, intensity = estimator[LABELS], estimator[INTENSITY]
         classes = tuple(str(label) for label in estimator.classes_)
         features = int(estimator.n_features_in_)
     except SignfaceError:
@@ -134,11 +146,12 @@ def load_model(name_or_path: str | PathLike[str] = "default") -> TrainedModel:
         ) from error
     if (
         classes != card.labels
-        or features != len(card.bases)
+        or features != len(DescriptorVariant(card.features, card.normalise).names(card.bases))
+        or not (intensity is None or hasattr(intensity, "annotate"))
         or not hasattr(estimator, "annotate" if card.classifier in SEQUENCE_NAMES else "predict_proba")
     ):
         raise SignfaceError("its estimator and its card do not belong together", file=file, hint="train it again")
-    return TrainedModel(estimator, card, name=file.stem)
+    return TrainedModel(estimator, card, name=file.stem, intensity=intensity)
 
 
 def _found(name_or_path: str | PathLike[str]) -> Path:
@@ -162,6 +175,12 @@ def _card(content: dict[str, Any]) -> Card:
     card = Card(**values)
     if not (isinstance(card.bases, tuple) and isinstance(card.labels, tuple) and isinstance(card.scores, dict)):
         raise ValueError("the card's lists are no lists")
+    if card.calibration and not all(isinstance(card.calibration.get(name), float) for name in ("slope", "offset")):
+        raise ValueError("the card's calibration is no line")
+    try:
+        DescriptorVariant(card.features, card.normalise).check()
+    except SignfaceError as error:
+        raise ValueError(error.problem) from error
     return card
 
 

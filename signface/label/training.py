@@ -1,126 +1,27 @@
 """Training a classifier on annotated takes (thesis 4.4.3).
 
-- `Example`: a solved take with its reference annotation.
-- `training_frames`: the frames a classifier learns from.
 - `train_model`: a trained `TrainedModel`.
-- `score_by_take`: how well it does on takes it has not seen, within the training takes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
-from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
+from signface.label.calibration import fit_calibration
+from signface.label.examples import TRAINING_RATE, Example, common_bases, frame_table, signer_levels
+from signface.label.folds import inner_folds
+from signface.label.intensity import train_intensity
 from signface.label.labellers import SEQUENCE_NAMES, make_labeller
-from signface.label.labelling import label_spans
-from signface.label.model import Card, TrainedModel, on_bases
+from signface.label.model import AGGREGATES, Card, TrainedModel, on_bases
+from signface.label.tuning import balanced_accuracy, judge_left_out, search_parameters
+from signface.label.variants import DescriptorVariant
 from signface.label.vocabulary import AFFECTS
-from signface.segment.segments import Segments
-
-#: Frames per second kept for training: a held face hardly changes in a tenth of a second.
-TRAINING_RATE = 10.0
-
-
-@dataclass(frozen=True)
-class Example:
-    """A solved take with its reference annotation.
-
-    Parameters
-    ----------
-    take : str
-        Name of the take, unique in its corpus.
-    signer, kind : str
-        As in the corpus (`IE`, `SE`, `EU` or any other word).
-    descriptors : Descriptors
-    reference : Segments
-        With the column `label`: labels of stable segments, names of transitions.
-    """
-
-    take: str
-    signer: str
-    kind: str
-    descriptors: Descriptors
-    reference: Segments
-
-    def __post_init__(self) -> None:
-        if not self.reference.labelled:
-            raise SignfaceError(f"{self.take}: its reference annotation has no labels")
-        unknown = sorted({str(label) for label in self.stable["label"]} - set(AFFECTS))
-        if unknown:
-            raise SignfaceError(
-                f"{self.take}: its reference annotation has the unknown label {', '.join(unknown)}",
-                hint=f"the labels of stable segments are {' '.join(AFFECTS)}",
-            )
-
-    @property
-    def stable(self) -> pd.DataFrame:
-        """The rows of the reference's stable segments."""
-        return self.reference.table[self.reference.table["kind"] == "stable"]
-
-
-def training_frames(
-    example: Example, bases: Sequence[str], *, rate: float = TRAINING_RATE
-) -> tuple[np.ndarray, np.ndarray]:
-    """Weights and labels of evenly spaced frames of the reference's stable segments.
-
-    Neighbouring frames at 200 Hz are nearly equal: `rate` frames per second are kept (at least the middle one of
-    each segment), which costs no accuracy worth the name and makes the support vector machines train in seconds.
-    Frames without weights are left out.
-
-    Parameters
-    ----------
-    example : Example
-    bases : sequence of str
-        The columns wanted, in this order.
-    rate : float
-        Frames kept per second of stable segment (Hz).
-
-    Returns
-    -------
-    (K, len(bases)) weights and (K,) labels.
-    """
-    descriptors = example.descriptors
-    columns = [descriptors.names.index(name) for name in bases]
-    known = np.isfinite(descriptors.weights).all(axis=1)
-    time = descriptors.time
-    frames, labels = [], []
-    for start, end, label in example.stable[["start_s", "end_s", "label"]].itertuples(index=False):
-        inside = np.flatnonzero((time >= start) & (time < end) & known)
-        if len(inside) == 0:
-            continue
-        count = max(1, round(len(inside) / descriptors.rate * rate))
-        picked = inside[((np.arange(count) + 0.5) * len(inside) / count).astype(int)]
-        frames.append(descriptors.weights[np.ix_(picked, columns)])
-        labels += [label] * count
-    if not frames:
-        return np.zeros((0, len(bases))), np.zeros(0, dtype=str)
-    return np.concatenate(frames), np.array(labels, dtype=str)
-
-
-def common_bases(examples: Sequence[Example]) -> tuple[str, ...]:
-    """The bases of the examples.
-
-    Raises
-    ------
-    SignfaceError
-        Two takes have other bases; the message names them.
-    """
-    first = examples[0]
-    for other in examples[1:]:
-        if set(other.descriptors.names) != set(first.descriptors.names):
-            differ = sorted(set(other.descriptors.names) ^ set(first.descriptors.names))
-            raise SignfaceError(
-                f"the takes {first.take} and {other.take} were solved with other bases ({', '.join(differ[:5])})",
-                hint="train on takes of one face",
-            )
-    return first.descriptors.names
 
 
 def train_model(
@@ -128,6 +29,14 @@ def train_model(
     *,
     classifier: str = "forest",
     seed: int = 0,
+    features: Sequence[str] = ("weights",),
+    normalise: str = "none",
+    aggregate: str = "mean",
+    balanced: bool = False,
+    parameters: Mapping[str, Any] | None = None,
+    search: bool = False,
+    calibrate: bool = False,
+    folds: int = 5,
     face: str = "unknown",
     layout: str = "unknown",
     corpus: str = "unknown",
@@ -138,7 +47,8 @@ def train_model(
     """Train a classifier on annotated takes.
 
     Those of `NAMES` of `signface.label.labellers` learn from the frames of the stable segments; the sequence models of
-    `SEQUENCE_NAMES` from whole takes, transitions included.
+    `SEQUENCE_NAMES` from whole takes, transitions included. Where the takes are annotated with intensities, those are
+    learnt beside the labels (`signface.label.intensity`).
 
     Parameters
     ----------
@@ -148,50 +58,116 @@ def train_model(
         A name of one of them.
     seed : int
         Two trainings with one seed on the same takes give the same model.
+    features, normalise : optional
+        Descriptor variant (`signface.label.variants`). Sequence models make their own features of the weights.
+    aggregate : str
+        How a segment gets its label: a name of `signface.label.model.AGGREGATES`.
+    balanced : bool
+        Let every label weigh the same. Sequence models weigh rare frames by themselves.
+    parameters : mapping, optional
+        Parameters of the classifier to set.
+    search : bool
+        Look for the best parameters among those of `signface.label.tuning.GRIDS`, by takes (with several signers, by
+        signers) left out of the training takes.
+    calibrate : bool
+        Make confidences mean the share of right labels, as found on takes left out of the training takes in the same
+        way; kept where that helps on takes that the calibration itself has not seen. The card then also says how many
+        labels of left-out takes were right. This trains `folds` times more.
+    folds : int
+        Number of folds of both, at most the number of takes (of signers, where there are several).
     face, layout, corpus, scores : optional
         For the model's card.
     rate : float
-        See `training_frames`.
+        See `signface.label.examples.training_frames`.
     name : str
         Name of the model.
 
     Raises
     ------
     SignfaceError
-        There is no training frame, only one label, or a take has other bases.
+        There is no training frame, only one label, a take has other bases, or an option is unknown.
     """
     if not examples:
         raise SignfaceError("there is no annotated take to train on", hint="name other kinds or another signer")
+    if aggregate not in AGGREGATES:
+        raise SignfaceError(f"there is no way to aggregate named {aggregate}", hint=f"choose {' or '.join(AGGREGATES)}")
+    variant = DescriptorVariant(tuple(features), normalise).check()
+    if classifier in SEQUENCE_NAMES and variant.features != ("weights",):
+        raise SignfaceError(
+            f"{classifier} makes its own features of the weights", hint="leave out the features, or normalise signers"
+        )
     ordered = sorted(examples, key=lambda example: (example.signer, example.kind, example.take))
-    bases = common_bases(ordered)
-    fit = _fit_sequence if classifier in SEQUENCE_NAMES else _fit_frames
-    labeller, frames = fit(ordered, bases, classifier, seed, rate)
-    card = Card(
+    blank = Card(
         classifier=classifier,
-        bases=bases,
-        labels=tuple(str(label) for label in labeller.classes_),
+        bases=common_bases(ordered),
+        labels=(),
         face=face,
         layout=layout,
         corpus=corpus,
-        kinds=tuple(sorted({example.kind for example in ordered})),
-        signers=tuple(sorted({example.signer for example in ordered})),
-        takes=tuple(sorted(example.take for example in ordered)),
-        frames=frames,
         seed=seed,
         scores=dict(scores or {}),
+        features=tuple(features),
+        normalise=normalise,
+        aggregate=aggregate,
+        balanced=balanced,
         version=version("signface"),
+    )
+
+    def fit(takes: Sequence[Example], chosen: Mapping[str, Any]) -> TrainedModel:
+        return _fit(takes, replace(blank, parameters=dict(chosen)), rate=rate, name=name)
+
+    chosen = dict(parameters or {})
+    if search:
+        found, _ = search_parameters(ordered, classifier, fit, folds=folds)
+        chosen |= found
+    model = fit(ordered, chosen)
+    if calibrate:
+        model = _calibrated(model, ordered, fit, folds)
+    return replace(model, intensity=train_intensity(ordered))
+
+
+def _fit(examples: Sequence[Example], card: Card, *, rate: float, name: str) -> TrainedModel:
+    """A model with its labels, uncalibrated, and what the card says of the takes."""
+    fit = _fit_sequence if card.classifier in SEQUENCE_NAMES else _fit_frames
+    labeller, frames = fit(examples, card, rate)
+    card = replace(
+        card,
+        labels=tuple(str(label) for label in labeller.classes_),
+        kinds=tuple(sorted({example.kind for example in examples})),
+        signers=tuple(sorted({example.signer for example in examples})),
+        takes=tuple(sorted(example.take for example in examples)),
+        frames=frames,
     )
     return TrainedModel(labeller, card, name=name)
 
 
-def _fit_frames(
-    examples: Sequence[Example], bases: Sequence[str], classifier: str, seed: int, rate: float
-) -> tuple[Any, int]:
+def _calibrated(model: TrainedModel, examples: Sequence[Example], fit: Any, folds: int) -> TrainedModel:
+    """The model with its calibration and its scores on left-out takes, where there are enough to leave any out."""
+    try:
+        pairs = inner_folds(examples, folds=folds)
+        table = judge_left_out(pairs, fit, model.card.parameters) if pairs else None
+    except SignfaceError:  # what is left shows one expression only: nothing can be said
+        table = None
+    if table is None:
+        return model
+    hits = (table["truth"] == table["found"]).to_numpy()
+    what = "signers" if len(model.card.signers) > 1 else "takes"
+    card = replace(
+        model.card,
+        calibration=fit_calibration(table["confidence"].to_numpy(float), hits, table["group"].tolist()),
+        scores={
+            **model.card.scores,
+            f"accuracy on reference segments of left-out training {what}": float(hits.mean()),
+            f"balanced accuracy on reference segments of left-out training {what}": balanced_accuracy(table),
+        },
+    )
+    return replace(model, card=card)
+
+
+def _fit_frames(examples: Sequence[Example], card: Card, rate: float) -> tuple[Any, int]:
     """A classifier trained on frames of stable segments, and how many there were."""
-    labeller = make_labeller(classifier, seed=seed)
-    pairs = [training_frames(example, bases, rate=rate) for example in examples]
-    weights = np.concatenate([pair[0] for pair in pairs])
-    labels = np.concatenate([pair[1] for pair in pairs])
+    labeller = make_labeller(card.classifier, seed=card.seed, balanced=card.balanced, parameters=card.parameters)
+    frames, labels, *_ = frame_table(examples, features=card.features, normalise=card.normalise, rate=rate)
     found = [label for label in AFFECTS if label in set(labels)]
     if len(found) < 2:
         raise SignfaceError(
@@ -204,54 +180,32 @@ def _fit_frames(
             f"the training takes hold less than half a second of {AFFECTS[rarest]} ({rarest})",
             hint="train on more takes of it, or on takes without it",
         )
-    return labeller.fit(weights, labels), len(labels)
+    if card.balanced and card.classifier.startswith("knn"):
+        kept = _equally_many(labels)
+        frames, labels = frames[kept], labels[kept]
+    return labeller.fit(frames, labels), len(labels)
 
 
-def _fit_sequence(
-    examples: Sequence[Example], bases: Sequence[str], classifier: str, seed: int, rate: float
-) -> tuple[Any, int]:
+def _equally_many(labels: np.ndarray) -> np.ndarray:
+    """Rows, evenly spaced among those of each label, as many of each as of the rarest."""
+    rows = [np.flatnonzero(labels == label) for label in np.unique(labels)]
+    count = min(map(len, rows))
+    return np.sort(np.concatenate([own[((np.arange(count) + 0.5) * len(own) / count).astype(int)] for own in rows]))
+
+
+def _fit_sequence(examples: Sequence[Example], card: Card, rate: float) -> tuple[Any, int]:
     """A sequence model trained on whole takes, and how many frames it saw."""
     from signface.label.sequence import make_sequence_labeller
 
-    labeller = make_sequence_labeller(classifier, seed=seed)
-    labeller.fit([on_bases(e.descriptors, bases) for e in examples], [e.reference for e in examples])
+    labeller = make_sequence_labeller(card.classifier, seed=card.seed)
+    unknown = sorted(set(card.parameters) - set(labeller.get_params()))
+    if unknown:
+        raise SignfaceError(
+            f"{card.classifier} has no parameter named {unknown[0]}", hint=f"it has {', '.join(labeller.get_params())}"
+        )
+    labeller.set_params(**card.parameters)
+    levels = signer_levels(examples) if card.normalise == "signer" else {}
+    variant = DescriptorVariant(normalise=card.normalise)
+    takes = [variant.of(on_bases(e.descriptors, card.bases), levels.get(e.signer)) for e in examples]
+    labeller.fit(takes, [e.reference for e in examples])
     return labeller, labeller.n_frames_
-
-
-def score_by_take(
-    examples: Sequence[Example], *, classifier: str = "forest", seed: int = 0, folds: int = 5
-) -> dict[str, float]:
-    """Accuracy on takes left out of the training, among the training takes themselves.
-
-    The takes are dealt into folds, kind by kind and signer by signer; each fold in turn is left out, and the stable
-    segments of its reference are labelled by what was trained on the others. It says how well the classifier learns
-    this material, not how well it does on other material or other signers: `signface evaluate` measures that.
-
-    Parameters
-    ----------
-    examples : sequence of Example
-    classifier, seed : optional
-        See `train_model`.
-    folds : int
-        Number of folds, at most the number of takes.
-
-    Returns
-    -------
-    dict
-        One accuracy under a name that says on what; empty when there are too few takes to leave any out.
-    """
-    ordered = sorted(examples, key=lambda example: (example.signer, example.kind, example.take))
-    folds = min(folds, len(ordered))
-    right = total = 0
-    for fold in range(folds):
-        kept = [example for number, example in enumerate(ordered) if number % folds != fold]
-        try:
-            model = train_model(kept, classifier=classifier, seed=seed)
-        except SignfaceError:  # what is left shows one expression only: nothing can be said
-            return {}
-        for example in ordered[fold::folds]:
-            spans = example.stable[["start_s", "end_s"]].to_numpy(float)
-            labels, _ = label_spans(example.descriptors, spans, model)
-            right += int((np.array(labels) == example.stable["label"].to_numpy(object)).sum())
-            total += len(labels)
-    return {"accuracy on reference segments of left-out training takes": right / total} if total else {}

@@ -1,0 +1,204 @@
+"""Variants of the descriptor that a classifier can be trained on, beside the weights as they are.
+
+- `FEATURES`, `NORMALISATIONS`: what there is to choose from.
+- `DescriptorVariant`: a choice of them, as a transformer of takes.
+- `SignerLevel`, `signer_level`: where a signer's face rests and how far it moves, without any label.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.signal import savgol_filter
+from sklearn.base import BaseEstimator, TransformerMixin
+
+from signface.descriptors import Descriptors
+from signface.errors import SignfaceError
+from signface.label.frame_features import Means
+from signface.segment.energy import bridged
+
+#: name: what it is.
+FEATURES = {
+    "weights": "the weights",
+    "derivatives": "how fast each weight changes, 1/s",
+    "windows": "mean and standard deviation of each weight over the second around the frame",
+}
+
+#: name: what it is.
+NORMALISATIONS = {
+    "none": "weights as they are",
+    "signer": "weights less the signer's mean, over their spread",
+}
+
+#: Width of the windows, seconds.
+WINDOW_S = 1.0
+
+#: Width of the parabola whose slope is the derivative, seconds (as `signface.segment.energy.energies`).
+SLOPE_S = 0.23
+
+#: Added to every spread: a base that hardly moves must not be blown up to the size of one that does (weights are 0 at
+#: rest and 1 fully active).
+LEAST_SPREAD = 0.02
+
+
+@dataclass(frozen=True)
+class SignerLevel:
+    """How a signer's weights lie, whatever is expressed.
+
+    Parameters
+    ----------
+    names : tuple of str
+        The bases.
+    mean, spread : (N,) arrays
+        Mean and standard deviation of the weight of each base over all frames.
+    """
+
+    names: tuple[str, ...]
+    mean: np.ndarray
+    spread: np.ndarray
+
+
+def signer_level(takes: Sequence[Descriptors]) -> SignerLevel:
+    """Mean and spread of the weights of a signer over some takes; every frame counts the same time.
+
+    No label is looked at, so that takes that are to be labelled can be used.
+
+    Raises
+    ------
+    SignfaceError
+        There is no take, none has a frame with weights, or they have other bases.
+    """
+    if not takes:
+        raise SignfaceError("there is no take of the signer to normalise by")
+    names = takes[0].names
+    seconds, total, squares = 0.0, np.zeros(len(names)), np.zeros(len(names))
+    for take in takes:
+        if set(take.names) != set(names):
+            raise SignfaceError(f"{take.name} was solved with other bases than {takes[0].name}")
+        weights = take.weights[:, [take.names.index(name) for name in names]]
+        weights = weights[np.isfinite(weights).all(axis=1)]
+        seconds += len(weights) / take.rate
+        total += weights.sum(axis=0) / take.rate
+        squares += (weights**2).sum(axis=0) / take.rate
+    if not seconds:
+        raise SignfaceError(f"{takes[0].name}: no frame has weights", hint="look at the markers: signface take info")
+    mean = total / seconds
+    return SignerLevel(names, mean, np.sqrt((squares / seconds - mean**2).clip(0)))
+
+
+class DescriptorVariant(TransformerMixin, BaseEstimator):
+    """Takes with the columns that a classifier is to see, as a transformer of scikit-learn.
+
+    It learns nothing from the takes it is fitted on: what it gives for a take depends on that take and, where it
+    normalises, on the other takes of the same signer that are given with it.
+
+    Parameters
+    ----------
+    features : sequence of str
+        Names of `FEATURES`, in the order of the columns.
+    normalise : str
+        A name of `NORMALISATIONS`.
+
+    Examples
+    --------
+    >>> variant = DescriptorVariant(features=("weights", "derivatives"))
+    >>> variant.names(("jawOpen",))
+    ('jawOpen', 'slope(jawOpen)')
+    """
+
+    def __init__(self, features: Sequence[str] = ("weights",), normalise: str = "none") -> None:
+        self.features = features
+        self.normalise = normalise
+
+    def check(self) -> DescriptorVariant:
+        """The variant itself.
+
+        Raises
+        ------
+        SignfaceError
+            A name is unknown, repeated or missing.
+        """
+        unknown = [name for name in self.features if name not in FEATURES]
+        if unknown or not self.features:
+            problem = f"there are no features named {unknown[0]}" if unknown else "no features are named"
+            raise SignfaceError(problem, hint=f"choose among {', '.join(FEATURES)}")
+        if len(set(self.features)) < len(self.features):
+            raise SignfaceError(f"features are named twice: {', '.join(self.features)}")
+        if self.normalise not in NORMALISATIONS:
+            raise SignfaceError(
+                f"there is no normalisation named {self.normalise}", hint=f"choose {' or '.join(NORMALISATIONS)}"
+            )
+        return self
+
+    @property
+    def plain(self) -> bool:
+        """Whether it leaves takes as they are."""
+        return tuple(self.features) == ("weights",) and self.normalise == "none"
+
+    def names(self, bases: Sequence[str]) -> tuple[str, ...]:
+        """Names of the columns for some bases."""
+        forms = {"weights": ("{}",), "derivatives": ("slope({})",), "windows": ("mean({})", "deviation({})")}
+        return tuple(form.format(base) for name in self.features for form in forms[name] for base in bases)
+
+    def fit(self, takes: Sequence[Descriptors], y: object = None) -> DescriptorVariant:
+        """Nothing is learnt; the names are checked."""
+        return self.check()
+
+    def transform(self, takes: Sequence[Descriptors], signers: Sequence[str] | None = None) -> list[Descriptors]:
+        """The takes with the columns wanted.
+
+        Parameters
+        ----------
+        takes : sequence of Descriptors
+        signers : sequence of str, optional
+            Who signs each; one and the same signer when not given.
+        """
+        who = [""] * len(takes) if signers is None else list(signers)
+        levels: dict[str, SignerLevel | None] = dict.fromkeys(who)
+        if self.normalise == "signer":
+            levels = {name: signer_level([t for t, w in zip(takes, who, strict=True) if w == name]) for name in levels}
+        return [self.of(take, levels[name]) for take, name in zip(takes, who, strict=True)]
+
+    def of(self, take: Descriptors, level: SignerLevel | None = None) -> Descriptors:
+        """One take with the columns wanted; `level` is that of the take alone when not given."""
+        self.check()
+        if self.normalise == "signer":
+            level = signer_level([take]) if level is None else level
+            place = [level.names.index(name) for name in take.names]
+            scaled = (take.weights - level.mean[place]) / (level.spread[place] + LEAST_SPREAD)
+            take = replace(take, weights=scaled)
+        if tuple(self.features) == ("weights",):
+            return take
+        known = np.isfinite(take.weights).all(axis=1)
+        smooth = bridged(take) if known.any() else take.weights
+        parts: list[np.ndarray] = []
+        for name in self.features:
+            if name == "weights":
+                parts.append(take.weights)
+            elif name == "derivatives":
+                parts.append(_slopes(smooth, take.rate))
+            else:
+                parts += _window_statistics(smooth, take.rate)
+        columns = np.concatenate(parts, axis=1)
+        columns[~known] = np.nan
+        return replace(take, weights=columns, names=self.names(take.names))
+
+
+def _slopes(weights: np.ndarray, rate: float) -> np.ndarray:
+    """(F, N) rates of change, 1/s, of a parabola fitted in a sliding window; zero for a take of fewer than 3 frames."""
+    frames = len(weights)
+    window = min(max(3, 2 * round(SLOPE_S * rate / 2) + 1), frames if frames % 2 else frames - 1)
+    if window < 3:
+        return np.zeros_like(weights)
+    return savgol_filter(weights, window, polyorder=2, deriv=1, delta=1 / rate, axis=0, mode="mirror")
+
+
+def _window_statistics(weights: np.ndarray, rate: float) -> list[np.ndarray]:
+    """Two (F, N): mean and standard deviation over `WINDOW_S` around each frame; the ends of the take are held."""
+    time = (np.arange(len(weights)) + 0.5) / rate
+    low, high = time - WINDOW_S / 2, time + WINDOW_S / 2
+    mean = Means(weights, rate).between(low, high)
+    squares = Means(weights**2, rate).between(low, high)
+    return [mean, np.sqrt((squares - mean**2).clip(0))]
