@@ -1,13 +1,17 @@
-"""A take to descriptors: the whole way from markers to weights.
+"""A recording to descriptors: the whole way from markers to weights.
 
-- `solve_take`: the whole way.
-- `prepare_take`: its first half, marker displacements on the avatar; every solver starts from these.
-- `neutral_markers`: where each face marker stands in the neutral frame.
+- `solve_take`: the whole way, to descriptors in memory.
+- `solve_pieces`: the same piece by piece, for recordings of any length.
+- `prepare_take`: the first half, marker displacements on the avatar (`signface.solve.preparation`).
+
+A recording is gone through twice: once to find what holds for all of it (the neutral frame above all), once to solve
+it. One that is no longer than a piece is cleaned once.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -15,114 +19,16 @@ from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
-from signface.solve.adaptation import MorphologicalAdaptation, SimilarityAdaptation, make_adaptation
 from signface.solve.methods import make_solver
-from signface.solve.resting import resting_time
-from signface.solve.solver import Solution
-from signface.takes.filtering import CUTOFF_HZ, lowpass
-from signface.takes.gaps import LONG_S, SHORT_S, fill_gaps
-from signface.takes.labels import rename_to
-from signface.takes.stabilisation import align_neutral, stabilise
-from signface.takes.take import Take
+from signface.solve.preparation import Preparation, PreparedTake, prepare_take
+from signface.takes.cleaning import Progress, silently
+from signface.takes.recording import PIECE, Recording, pieces
 
-#: The neutral place of a marker is its median within this time of the neutral frame (s): one frame's jitter would
-#: otherwise be carried into every frame of the take.
-NEUTRAL_WINDOW_S = 0.05
-
-
-@dataclass(frozen=True)
-class PreparedTake:
-    """A take brought to the avatar, ready to be solved.
-
-    Parameters
-    ----------
-    displacements : (F, P, 3) array
-        Displacements of the face markers from their neutral places (eq. 5.21), adapted to the avatar, millimetres;
-        NaN where a marker is missing.
-    layout : MarkerLayout
-        The given layout without the markers that the neutral frame does not show; `displacements` follows it.
-    head : (F, 4, 4) array
-        Poses of the head.
-    adaptation : SimilarityAdaptation or MorphologicalAdaptation
-        From the signer's face, in its neutral pose, to the avatar's.
-    take : Take
-        The cleaned take.
-    note : str
-        What was done, for the history.
-    """
-
-    displacements: np.ndarray
-    layout: MarkerLayout
-    head: np.ndarray
-    adaptation: SimilarityAdaptation | MorphologicalAdaptation
-    take: Take
-    note: str
-
-    def described(self, face: FaceModel, solution: Solution, *notes: str) -> Descriptors:
-        """The descriptors of the take, from what a solver made of its displacements; `notes` end the history."""
-        return Descriptors(
-            weights=solution.weights,
-            names=face.names,
-            rate=self.take.rate,
-            start=self.take.start,
-            residual=solution.residual,
-            head=self.head,
-            name=self.take.name,
-            history=(*self.take.history, *notes),
-        )
-
-
-def prepare_take(
-    take: Take,
-    face: FaceModel,
-    layout: MarkerLayout,
-    *,
-    neutral: str | float = "auto",
-    adaptation: str = "similarity",
-    short_gap_s: float = SHORT_S,
-    long_gap_s: float = LONG_S,
-    cutoff_hz: float = CUTOFF_HZ,
-    filter_method: str = "butterworth",
-    head_fallback: str | None = None,
-) -> PreparedTake:
-    """Clean a take, take the head's motion away and adapt it to the avatar (Reverdy 2019, 5.2.1 and 5.2.2).
-
-    Parameters and errors are those of `solve_take`.
-    """
-    known = rename_to(take, layout.labels)
-    clean = lowpass(fill_gaps(known, short_s=short_gap_s, long_s=long_gap_s), cutoff_hz=cutoff_hz, method=filter_method)
-    labels = [label for label in layout.face_labels if label in clean.labels]
-    head = [label for label in layout.head_labels if label in clean.labels]
-    if neutral == "auto":
-        time = resting_time(clean, face, layout, adaptation=adaptation)
-        found = "found"
-    else:
-        time, found = float(neutral), "given"
-    clean.frame_at(time)
-    shown, places = neutral_markers(clean, labels, time)
-    if len(shown) < 4:
-        raise SignfaceError(
-            f"only {len(shown)} face markers are seen at the neutral time {time:.3f} s",
-            file=take.name,
-            hint="give another neutral time: --neutral SECONDS",
-        )
-    part = layout.restricted([*shown, *head])
-    target = part.points(face, shown)
-    aligned = align_neutral(clean, shown, target, time)
-    still, poses = stabilise(aligned, head=head, neutral_s=time, fallback=head_fallback)
-    _, places = neutral_markers(still, shown, time)
-    mapping = make_adaptation(adaptation, places, target)
-    dropped = [label for label in layout.face_labels if label not in shown]
-    note = f"neutral frame {found} at {time:.3f} s; adapted to {face.name}"
-    note += f" ({mapping.description}) by {len(shown)} markers of {layout.name}"
-    note += f" without {', '.join(dropped[:5])}{' ...' * (len(dropped) > 5)}" if dropped else ""
-    # Against the adapted neutral, not the avatar's: where the map passes by the markers, rest must still be rest.
-    displacements = mapping.transform(still.select(shown)) - mapping.transform(places)
-    return PreparedTake(displacements, part, poses, mapping, still, note)
+__all__ = ["PreparedTake", "prepare_take", "solve_pieces", "solve_take"]
 
 
 def solve_take(
-    take: Take,
+    recording: Recording,
     face: FaceModel,
     layout: MarkerLayout,
     *,
@@ -130,17 +36,13 @@ def solve_take(
     adaptation: str = "similarity",
     method: str = "thin-shell",
     alpha: float | None = None,
-    short_gap_s: float = SHORT_S,
-    long_gap_s: float = LONG_S,
-    cutoff_hz: float = CUTOFF_HZ,
-    filter_method: str = "butterworth",
-    head_fallback: str | None = None,
+    **options: Any,
 ) -> Descriptors:
-    """Blendshape weights of a take (Reverdy 2019, 5.2).
+    """Blendshape weights of a recording (Reverdy 2019, 5.2), all of them in memory.
 
     Parameters
     ----------
-    take : Take
+    recording : Take or TakeFile
         As it was read; markers in any place of the room.
     face : FaceModel
         The avatar.
@@ -158,6 +60,10 @@ def solve_take(
         See `signface.takes.filtering.lowpass`.
     head_fallback : str, optional
         `least-moving`: carry the head by the least-moving markers where head markers do not suffice.
+    piece : int
+        Frames worked on at a time; what is found does not depend on it but by rounding.
+    progress : callable, optional
+        Shows how far we are, see `signface.takes.cleaning.Progress`.
 
     Returns
     -------
@@ -180,34 +86,60 @@ def solve_take(
     >>> solve_take(take, face, choose_layout(take.labels, face)).weights.shape  # doctest: +SKIP
     (12000, 51)
     """
-    prepared = prepare_take(
-        take,
-        face,
-        layout,
-        neutral=neutral,
-        adaptation=adaptation,
-        short_gap_s=short_gap_s,
-        long_gap_s=long_gap_s,
-        cutoff_hz=cutoff_hz,
-        filter_method=filter_method,
-        head_fallback=head_fallback,
+    parts = list(
+        solve_pieces(
+            recording, face, layout, neutral=neutral, adaptation=adaptation, method=method, alpha=alpha, **options
+        )
     )
-    solution = make_solver(method, face, prepared.layout, alpha=alpha).solve(prepared.displacements)
-    note = f"{prepared.note}; solve {method}" + (f" alpha={alpha:g}" if alpha is not None else "")
-    return prepared.described(face, solution, note)
+    if len(parts) == 1:
+        return parts[0]
+    return Descriptors(
+        weights=np.concatenate([part.weights for part in parts]),
+        names=face.names,
+        rate=recording.rate,
+        start=recording.start,
+        residual=np.concatenate([part.residual for part in parts if part.residual is not None]),
+        head=np.concatenate([part.head for part in parts if part.head is not None]),
+        name=recording.name,
+        history=parts[-1].history,
+    )
 
 
-def neutral_markers(take: Take, labels: list[str], neutral_s: float) -> tuple[list[str], np.ndarray]:
-    """The markers that are seen around the neutral time, and their median places.
+def solve_pieces(
+    recording: Recording,
+    face: FaceModel,
+    layout: MarkerLayout,
+    *,
+    method: str = "thin-shell",
+    alpha: float | None = None,
+    piece: int = PIECE,
+    progress: Progress = silently,
+    **options: Any,
+) -> Iterator[Descriptors]:
+    """Blendshape weights of a recording, piece by piece, one after the other.
 
-    Returns
-    -------
-    (list of str, (K, 3) array)
-        Labels in the order given, and places in millimetres.
+    Parameters and errors are those of `solve_take`. The last piece has the history of the whole take; how many gaps
+    were filled, say, is not known before.
+
+    Yields
+    ------
+    Descriptors
     """
-    frame = take.frame_at(neutral_s)
-    reach = int(NEUTRAL_WINDOW_S * take.rate)
-    window = take.select(labels)[max(0, frame - reach) : frame + reach + 1]
-    seen = np.isfinite(window[..., 0]).any(axis=0)
-    places = np.nanmedian(window[:, seen], axis=0)
-    return [label for label, here in zip(labels, seen, strict=True) if here], places
+    if piece < 1:
+        raise SignfaceError(f"a piece has one frame or more, not {piece}")
+    preparation = Preparation(recording, face, layout, piece=piece, progress=progress, **options)
+    solver = make_solver(method, face, preparation.layout, alpha=alpha)
+    note = f"{preparation.note}; solve {method}" + (f" alpha={alpha:g}" if alpha is not None else "")
+    for begin, end in progress(pieces(recording.n_frames, piece), "solving"):
+        displacements, head = preparation.frames(begin, end)
+        solution = solver.solve(displacements)
+        yield Descriptors(
+            weights=solution.weights,
+            names=face.names,
+            rate=recording.rate,
+            start=recording.start + begin / recording.rate,
+            residual=solution.residual,
+            head=head,
+            name=recording.name,
+            history=(*(preparation.history if end == recording.n_frames else recording.history), note),
+        )

@@ -1,6 +1,7 @@
 """Low-pass filters without lag, for marker trajectories.
 
 - `lowpass`: a take, filtered; `butterworth` or `raised-sine`.
+- `filtered`, `reach`: the same for a piece of one, and how much must stand beside the piece.
 - `raised_sine_response`: the spectral window of equation 7.1.
 """
 
@@ -20,6 +21,9 @@ HIGHEST_CUTOFF = 0.45
 
 #: Poles of the Butterworth filter in one direction; it goes over the data twice.
 ORDER = 2
+
+#: What is left of a frame's influence where it no longer counts: 10 mm become less than positions are rounded to.
+FORGOTTEN = 1e-18
 
 
 def raised_sine_response(frequencies: np.ndarray, cutoff_hz: float, width_hz: float) -> np.ndarray:
@@ -62,26 +66,47 @@ def _raised_sine(signals: np.ndarray, rate: float, cutoff_hz: float) -> np.ndarr
     return filtered
 
 
-def _butterworth_sections(rate: float, cutoff_hz: float) -> np.ndarray:
-    """Second-order sections whose forward and backward passes together have -3 dB at the cutoff.
+def _butterworth_coefficients(rate: float, cutoff_hz: float) -> tuple[np.ndarray, np.ndarray]:
+    """Numerator and denominator of the filter whose forward and backward passes together have -3 dB at the cutoff.
 
     Each pass is designed for a higher cutoff: two passes of a filter of order n have `1 / (1 + (w/w0)^2n)` for the
     gain, which is `1 / sqrt(2)` at `w = w0 (sqrt(2) - 1)^(1/2n)`. The correction is made on the analogue axis (the
-    tangent), where it is exact.
+    tangent), where it is exact; the bilinear transform of `1 / (s^2 + sqrt(2) s + 1)` gives the coefficients.
     """
-    from scipy.signal import butter
+    corner = np.tan(np.pi * cutoff_hz / rate) / (np.sqrt(2.0) - 1.0) ** (1 / (2 * ORDER))
+    whole = 1.0 + np.sqrt(2.0) * corner + corner**2
+    gain = corner**2 / whole
+    return (
+        np.array([gain, 2 * gain, gain]),
+        np.array([1.0, 2 * (corner**2 - 1) / whole, (1.0 - np.sqrt(2.0) * corner + corner**2) / whole]),
+    )
 
-    warped = np.tan(np.pi * cutoff_hz / rate) / (np.sqrt(2.0) - 1.0) ** (1 / (2 * ORDER))
-    corner = np.arctan(warped) / np.pi * rate
-    return butter(ORDER, corner, fs=rate, output="sos")
 
-
-def _butterworth(signals: np.ndarray, sections: np.ndarray, rate: float, cutoff_hz: float) -> np.ndarray:
+def _butterworth(signals: np.ndarray, rate: float, cutoff_hz: float) -> np.ndarray:
     """(n, K) signals filtered forward and backward, reflected oddly at both ends."""
-    from scipy.signal import sosfiltfilt
+    from signface.takes.biquad import forward_and_backward
 
+    b, a = _butterworth_coefficients(rate, cutoff_hz)
     pad = min(len(signals) - 1, int(np.ceil(3 * rate / cutoff_hz)))
-    return sosfiltfilt(sections, signals, axis=0, padlen=pad)
+    longer = np.concatenate(
+        [2 * signals[0] - signals[pad:0:-1], signals, 2 * signals[-1] - signals[-2 : -2 - pad : -1]]
+    )
+    forward_and_backward(longer, b, a, np.array([b[1] + b[2] - a[1] - a[2], b[2] - a[2]]))
+    return longer[pad : pad + len(signals)]
+
+
+def reach(rate: float, cutoff_hz: float, method: str) -> int | None:
+    """How many frames away a filtered frame still depends on others, as far as numbers tell; None for all of them.
+
+    The Butterworth filter forgets by its poles' radius a frame. The raised-sine window cuts the spectrum of the whole
+    take, and every frame depends on every other.
+    """
+    if cutoff_hz > HIGHEST_CUTOFF * rate:
+        return 0
+    if method != "butterworth":
+        return None
+    _, a = _butterworth_coefficients(rate, cutoff_hz)
+    return int(np.ceil(np.log(FORGOTTEN) / np.log(np.abs(np.roots(a)).max())))
 
 
 def lowpass(take: Take, *, cutoff_hz: float = CUTOFF_HZ, method: str = "butterworth") -> Take:
@@ -105,27 +130,45 @@ def lowpass(take: Take, *, cutoff_hz: float = CUTOFF_HZ, method: str = "butterwo
     SignfaceError
         The cutoff is not positive, or the method is unknown.
     """
+    _check(cutoff_hz, method)
+    return take.changed(
+        note(take.rate, cutoff_hz, method), positions=filtered(take.positions, take.rate, cutoff_hz, method)
+    )
+
+
+def _check(cutoff_hz: float, method: str) -> None:
     if method not in ("butterworth", "raised-sine"):
         raise SignfaceError(f"no filter named {method}", hint="take butterworth or raised-sine")
     if not (np.isfinite(cutoff_hz) and cutoff_hz > 0):
         raise SignfaceError(f"the cutoff must be positive, not {cutoff_hz} Hz")
-    if cutoff_hz > HIGHEST_CUTOFF * take.rate:
-        return take.changed(f"lowpass skipped: {cutoff_hz:g} Hz is too near half the rate of {take.rate:g} Hz")
-    sections = _butterworth_sections(take.rate, cutoff_hz)
-    known = np.isfinite(take.positions[..., 0])
+
+
+def note(rate: float, cutoff_hz: float, method: str) -> str:
+    """What `lowpass` does, for the history; raises as it does."""
+    _check(cutoff_hz, method)
+    if cutoff_hz > HIGHEST_CUTOFF * rate:
+        return f"lowpass skipped: {cutoff_hz:g} Hz is too near half the rate of {rate:g} Hz"
+    return f"lowpass {method} {cutoff_hz:g} Hz"
+
+
+def filtered(positions: np.ndarray, rate: float, cutoff_hz: float, method: str) -> np.ndarray:
+    """(F, M, 3) positions without fast variations; see `lowpass`."""
+    positions = positions.copy()
+    if cutoff_hz > HIGHEST_CUTOFF * rate:
+        return positions
+    known = np.isfinite(positions[..., 0])
     stretches: dict[tuple[int, int], list[int]] = {}  # markers seen in the same stretch are filtered together
     for marker in range(known.shape[1]):
         for begin, end in runs(known[:, marker]):
             stretches.setdefault((int(begin), int(end)), []).append(marker)
-    positions = take.positions.copy()
     for (begin, end), markers in stretches.items():
         if end - begin < 4:
             continue
         signals = positions[begin:end, markers].reshape(end - begin, -1)
         line = _line_through_ends(signals)  # passes as it is, however short the stretch
         if method == "butterworth":
-            filtered = _butterworth(signals - line, sections, take.rate, cutoff_hz)
+            smooth = _butterworth(signals - line, rate, cutoff_hz)
         else:
-            filtered = _raised_sine(signals - line, take.rate, cutoff_hz)
-        positions[begin:end, markers] = (line + filtered).reshape(end - begin, len(markers), 3)
-    return take.changed(f"lowpass {method} {cutoff_hz:g} Hz", positions=positions)
+            smooth = _raised_sine(signals - line, rate, cutoff_hz)
+        positions[begin:end, markers] = (line + smooth).reshape(end - begin, len(markers), 3)
+    return positions

@@ -1,6 +1,7 @@
 """Filling gaps in trajectories.
 
 - `fill_gaps`: short gaps by a spline, longer ones from the motion of the neighbouring markers.
+- `GapFiller`: the same, for a recording in pieces.
 - `gap_runs`: the gaps of each marker.
 """
 
@@ -11,6 +12,7 @@ import warnings
 import numpy as np
 
 from signface.errors import SignfaceError
+from signface.takes.recording import Recording
 from signface.takes.rigid import apply, flatness, inverse, rigid_transforms
 from signface.takes.runs import runs
 from signface.takes.take import Take
@@ -23,6 +25,9 @@ SUPPORT_S = 0.04
 
 #: How many neighbours carry a marker over a gap, and how many frames they are learnt from.
 NEIGHBOURS, TRAINING_FRAMES = 6, 300
+
+#: Frames of a take, evenly spaced, among which those to learn from are looked for: at least so many where there are.
+SAMPLE_FRAMES = 1500
 
 #: Markers nearer than this to one line (root mean square, mm) do not carry a head.
 FLATTEST_MM = 5.0
@@ -74,34 +79,41 @@ class _Carriers:
     All markers together give every frame a rigid pose, and so a place of each marker in the head, whatever the
     head does. There a marker's place is learnt from its neighbours' places by ridge regression over frames in which
     all are seen.
+
+    Parameters
+    ----------
+    sample : (S, M, 3) array
+        Frames of the take to learn from.
     """
 
-    def __init__(self, positions: np.ndarray) -> None:
-        known = np.isfinite(positions[..., 0])
-        self.positions = positions
-        self.rest = positions[np.argmax(known.sum(axis=1))]
+    def __init__(self, sample: np.ndarray) -> None:
+        known = np.isfinite(sample[..., 0])
+        self.rest = sample[np.argmax(known.sum(axis=1))]
         weights = (known & np.isfinite(self.rest[:, 0])).astype(float)
-        poses = rigid_transforms(np.nan_to_num(self.rest), positions, weights)
+        poses = rigid_transforms(np.nan_to_num(self.rest), sample, weights)
         poses[weights.sum(axis=1) < 3] = np.nan
-        self.places = apply(inverse(poses), positions)  # (F, M, 3) in the head
-        self.known = np.isfinite(self.places[..., 0])
-        sample = self.places[:: max(1, len(positions) // 200)]
-        middle = np.nanmedian(sample, axis=0)
+        self.places = apply(inverse(poses), sample)  # (S, M, 3) in the head
+        self.seen = np.isfinite(self.places[..., 0])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # markers that are never seen
+            middle = np.nanmedian(self.places[:: max(1, len(sample) // 200)], axis=0)
         distances = np.linalg.norm(middle[:, None] - middle[None], axis=2)
         np.fill_diagonal(distances, np.inf)
         self.nearest = np.argsort(np.where(np.isfinite(distances), distances, np.inf), axis=1, kind="stable")
 
-    def fill(self, marker: int, begin: int, end: int) -> np.ndarray | None:
+    def fill(self, positions: np.ndarray, marker: int, begin: int, end: int) -> np.ndarray | None:
         """(end - begin, 3) positions over a gap, or None where the neighbours do not suffice."""
-        if begin == 0 or end == len(self.known):
+        if begin == 0 or end == len(positions):
             return None
-        window = slice(begin - 1, end + 1)
+        recorded = positions[begin - 1 : end + 1]
+        known = np.isfinite(recorded[..., 0])
         near = self.nearest[marker]
-        seen = self.known[window, :][:, near].all(axis=0)
-        carriers = near[seen & (near != marker)][:NEIGHBOURS]
-        if len(carriers) < 3 or not self.known[[begin - 1, end], marker].all():
+        carriers = near[known[:, near].all(axis=0) & (near != marker)][:NEIGHBOURS]
+        if len(carriers) < 3 or not known[[0, -1], marker].all():
             return None
-        together = np.flatnonzero(self.known[:, carriers].all(axis=1) & self.known[:, marker])
+        together = np.flatnonzero(self.seen[:, carriers].all(axis=1) & self.seen[:, marker])
+        if len(together) == 0:
+            return None
         if len(together) > TRAINING_FRAMES:
             together = together[np.linspace(0, len(together) - 1, TRAINING_FRAMES).astype(int)]
         train = self.places[together][:, carriers].reshape(len(together), -1)
@@ -111,11 +123,10 @@ class _Carriers:
         normal[np.diag_indices_from(normal)] += RIDGE_MM2 * len(together)
         slopes = np.linalg.solve(normal, (train - middle).T @ (own - own_middle))
         # Over the gap the pose comes from one set of markers: it would jump where a marker comes or goes.
-        steady = self.known[window].all(axis=0) & np.isfinite(self.rest[:, 0])
+        steady = known.all(axis=0) & np.isfinite(self.rest[:, 0])
         steady[marker] = False
         if flatness(self.rest, steady[None])[0] < FLATTEST_MM:
             return None
-        recorded = self.positions[window]
         poses = rigid_transforms(self.rest[steady], recorded[:, steady], np.ones((len(recorded), steady.sum())))
         back = inverse(poses)
         over = apply(back, recorded[:, carriers]).reshape(len(recorded), -1)
@@ -124,6 +135,88 @@ class _Carriers:
         part = np.linspace(0.0, 1.0, end - begin + 2)[:, None]
         joined = predicted + (1 - part) * errors[0] + part * errors[1]  # a line in time joins the known ends
         return apply(poses[1:-1], joined[1:-1, None])[:, 0]
+
+
+class GapFiller:
+    """Fills the gaps of a recording, piece by piece; see `fill_gaps`.
+
+    Parameters
+    ----------
+    recording : Recording
+        From some of its frames the filler learns how markers follow their neighbours.
+    short_s, long_s : float
+
+    Attributes
+    ----------
+    reach : int
+        So many frames beside a piece decide how its gaps are filled.
+
+    Raises
+    ------
+    SignfaceError
+        A limit is negative or not a number.
+    """
+
+    def __init__(self, recording: Recording, *, short_s: float, long_s: float) -> None:
+        if not (short_s >= 0 and long_s >= 0):
+            raise SignfaceError("the longest gaps to fill are given in seconds, 0 or more")
+        self._recording, self.short_s, self.long_s = recording, short_s, long_s
+        self._support = max(3, round(SUPPORT_S * recording.rate) + 1)
+        self.reach = int(np.ceil(max(short_s, long_s) * recording.rate)) + self._support + 1
+        self._carriers: _Carriers | None = None
+        self._outcomes: dict[tuple[int, int], str] = {}
+
+    def fill(self, positions: np.ndarray, first: int = 0, piece: tuple[int, int] | None = None) -> np.ndarray:
+        """(F, M, 3) positions, filled.
+
+        Parameters
+        ----------
+        positions : (F, M, 3) array
+        first : int
+            Number of their first frame in the recording.
+        piece : (int, int), optional
+            The frames (of the recording) that are wanted, the others stand beside them; all by default.
+        """
+        rate = self._recording.rate
+        wanted = range(*(piece or (first, first + len(positions))))
+        given, positions = positions, positions.copy()
+        missing = np.isnan(positions[..., 0])
+        later: list[tuple[int, int, int]] = []
+        for marker in np.flatnonzero(missing.any(axis=0)).tolist():
+            for begin, end in runs(missing[:, marker]).tolist():
+                short = (end - begin) / rate <= self.short_s
+                path = _spline(given[:, marker], begin, end, self._support) if short else None
+                if path is None:
+                    later.append((marker, begin, end))
+                else:
+                    positions[begin:end, marker] = path
+                    self._note(wanted, marker, first + begin, "splined")
+        for marker, begin, end in later:
+            path = None
+            if (end - begin) / rate <= self.long_s:
+                path = self._learnt().fill(positions, marker, begin, end)
+            if path is not None:
+                positions[begin:end, marker] = path
+            self._note(wanted, marker, first + begin, "left" if path is None else "from neighbours")
+        return positions
+
+    def _learnt(self) -> _Carriers:
+        if self._carriers is None:
+            frames = self._recording.n_frames
+            self._carriers = _Carriers(self._recording.frames(0, frames, max(1, frames // SAMPLE_FRAMES)))
+        return self._carriers
+
+    def _note(self, wanted: range, marker: int, begin: int, outcome: str) -> None:
+        if begin in wanted:  # a gap that begins beside the piece is another piece's
+            self._outcomes[marker, begin] = outcome
+
+    @property
+    def note(self) -> str:
+        """What was done until now, for the history."""
+        found = list(self._outcomes.values())
+        counts = {what: found.count(what) for what in ("splined", "from neighbours", "left")}
+        said = ", ".join(f"{number} {what}" for what, number in counts.items() if number)
+        return f"fill_gaps up to {self.short_s:g} and {self.long_s:g} s: {said or 'no gaps'}"
 
 
 def fill_gaps(take: Take, *, short_s: float = SHORT_S, long_s: float = LONG_S) -> Take:
@@ -144,33 +237,6 @@ def fill_gaps(take: Take, *, short_s: float = SHORT_S, long_s: float = LONG_S) -
     SignfaceError
         A limit is negative or not a number.
     """
-    if not (short_s >= 0 and long_s >= 0):
-        raise SignfaceError("the longest gaps to fill are given in seconds, 0 or more")
-    positions = take.positions.copy()
-    missing = np.isnan(positions[..., 0])
-    support = max(3, round(SUPPORT_S * take.rate) + 1)
-    splined, carried = 0, 0
-    later: list[tuple[int, int, int]] = []
-    for marker in np.flatnonzero(missing.any(axis=0)).tolist():
-        trajectory = take.positions[:, marker]
-        for begin, end in runs(missing[:, marker]).tolist():
-            short = (end - begin) / take.rate <= short_s
-            path = _spline(trajectory, begin, end, support) if short else None
-            if path is None:
-                later.append((marker, begin, end))
-            else:
-                positions[begin:end, marker] = path
-                splined += 1
-    candidates = [gap for gap in later if (gap[2] - gap[1]) / take.rate <= long_s]
-    if candidates:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # markers that are never seen
-            carriers = _Carriers(positions)
-        for marker, begin, end in candidates:
-            path = carriers.fill(marker, begin, end)
-            if path is not None:
-                positions[begin:end, marker] = path
-                carried += 1
-    counts = {"splined": splined, "from neighbours": carried, "left": len(later) - carried}
-    said = ", ".join(f"{number} {what}" for what, number in counts.items() if number)
-    return take.changed(f"fill_gaps up to {short_s:g} and {long_s:g} s: {said or 'no gaps'}", positions=positions)
+    filler = GapFiller(take, short_s=short_s, long_s=long_s)
+    positions = filler.fill(take.positions)
+    return take.changed(filler.note, positions=positions)

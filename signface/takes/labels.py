@@ -2,7 +2,7 @@
 
 - `clean_labels`: what a reader does: which points have a name, and unique names for them.
 - `stripped`: a label without its subject's prefix.
-- `match_labels`, `rename_to`: the markers of a layout found in a take.
+- `match_labels`, `find_labels`, `rename_to`: the markers of a layout found in a take.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import re
 from collections.abc import Sequence
 
 from signface.errors import SignfaceError
+from signface.takes.recording import Recording
 from signface.takes.take import Take
 
 #: Names that tracking software gives to points nobody has labelled: `*12`, `U_3`, `Unlabeled 7`, or nothing at all.
@@ -133,6 +134,12 @@ def rename_to(take: Take, labels: Sequence[str]) -> Take:
     >>> rename_to(take, layout.labels).labels  # doctest: +SKIP
     ('LBRO1', 'LBRO2', ...)
     """
+    found, note = find_labels(take, labels)
+    return take.changed(note, positions=take.select(list(found.values())), labels=tuple(found))
+
+
+def find_labels(take: Recording, labels: Sequence[str]) -> tuple[dict[str, str], str]:
+    """For each of `labels` that a recording has, its own name for it, and a note for the history; see `rename_to`."""
     labels = list(labels)
     found = match_labels(take.labels, labels)
     missing = [label for label in labels if label not in found]
@@ -154,4 +161,4 @@ def rename_to(take: Take, labels: Sequence[str]) -> Take:
         notes.append(f"missing: {', '.join(close_names(missing, spare))}")
     if spare:
         notes.append(f"not in the layout: {', '.join(spare[:5])}{' ...' * (len(spare) > 5)}")
-    return take.changed("; ".join(notes), positions=take.select(list(found.values())), labels=tuple(found))
+    return found, "; ".join(notes)
