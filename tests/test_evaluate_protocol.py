@@ -121,8 +121,29 @@ def test_an_automatic_segment_should_have_the_label_of_most_of_it():
 def test_a_take_in_both_sets_is_refused(examples):
     with pytest.raises(SignfaceError, match="both trained on and tested"):
         Fold("S1", tuple(examples[:2]), tuple(examples[1:3]))
-    with pytest.raises(SignfaceError, match="both trained on and tested"):
-        folds_of(examples, protocol="within", train_kinds=["IE", "EU"], test_kinds=["EU"])
+
+
+def test_a_kind_that_is_trained_on_and_tested_is_tested_in_turns(examples):
+    found = folds_of(examples, protocol="within", train_kinds=["IE", "EU"], test_kinds=["EU"], turns=3)
+    tested = [e.take for fold in found for e in fold.test]
+    assert sorted(tested) == sorted(e.take for e in examples if e.kind == "EU")  # each once
+    for fold in found:
+        assert not {e.take for e in fold.train} & {e.take for e in fold.test}
+        assert {e.signer for e in (*fold.train, *fold.test)} == {fold.signer}
+        assert {e.take for e in fold.train if e.kind == "IE"} == {
+            e.take for e in examples if e.kind == "IE" and e.signer == fold.signer
+        }
+    scores = evaluate(found, classifiers=["knn1"]).metrics["classifiers"]["knn1"]["manual_segments"]
+    assert scores["n"] == sum(len(e.stable) for e in examples if e.kind == "EU")
+
+
+def test_takes_of_one_sentence_are_never_apart(examples):
+    named = [dataclasses.replace(e, sentence=f"{n % 3}" if e.kind == "EU" else None) for n, e in enumerate(examples)]
+    for fold in folds_of(named, protocol="within", train_kinds=["IE", "EU"], test_kinds=["EU"]):
+        assert not {e.sentence for e in fold.train} & {e.sentence for e in fold.test}
+    alike = [dataclasses.replace(e, sentence="1") for e in examples[:2]]
+    with pytest.raises(SignfaceError, match="sentences would be both"):
+        Fold("S1", tuple(alike[:1]), tuple(alike[1:]))
 
 
 @pytest.mark.parametrize(

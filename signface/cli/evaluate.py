@@ -5,18 +5,32 @@ from __future__ import annotations
 import argparse
 import csv
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from signface.cli.options import add_face_arguments
 from signface.cli.progress import progress
-from signface.cli.train import words
+from signface.cli.train import add_training_arguments, training_options, words
 from signface.errors import SignfaceError
 from signface.label.labellers import NAMES, SEQUENCE_NAMES
 
 EXAMPLE = """  signface evaluate corpora/feel -o reports/feel
   signface evaluate corpora/feel -o reports/feel --train-kinds IE,SE,EU --protocol across --classifiers net-hsmm"""
+
+
+#: What is printed of reference segments besides the accuracy, by its key in metrics.json; and of intensities.
+RELIABILITY = {
+    "balanced_accuracy": "balanced accuracy of reference segments",
+    "calibration_error": "expected calibration error of reference segments",
+}
+INTENSITY = {
+    "exact": "exact",
+    "within_one": "within one",
+    "mean_absolute_error": "mean error",
+    "quadratic_kappa": "kappa",
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,7 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--protocol",
         choices=("within", "across"),
-        help="train on the same signer, or on all others (default: both, if there are two signers)",
+        help="train on the same signer, or on all others (default: both, if there are two signers); a kind that is "
+        "both trained on and tested is tested in turns, whole takes left out",
     )
     parser.add_argument(
         "--classifiers",
@@ -40,6 +55,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAMES",
         default=list(NAMES),
         help=f"those of the thesis ({','.join(NAMES)}, the default) or sequence models ({','.join(SEQUENCE_NAMES)})",
+    )
+    add_training_arguments(parser)
+    parser.add_argument(
+        "--calibrate", action="store_true", help="calibrate confidences, by folds of the training takes"
     )
     parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")
     add_face_arguments(parser)
@@ -56,12 +75,7 @@ def run(arguments: argparse.Namespace) -> None:
             f"there is no classifier named {unknown[0]}" if unknown else "no classifier is named",
             hint=f"choose among {', '.join(NAMES | SEQUENCE_NAMES)}",
         )
-    both = sorted(set(arguments.train_kinds) & set(arguments.test_kinds))
-    if both and arguments.protocol != "across":
-        raise SignfaceError(
-            f"{', '.join(both)} would be both trained on and tested",
-            hint="choose kinds that do not overlap, or --protocol across, which tests signers that were not trained on",
-        )
+    training = {**training_options(arguments), "calibrate": arguments.calibrate}
     if arguments.output.exists() and not arguments.output.is_dir():
         raise SignfaceError("is a file, not a folder", file=arguments.output, hint="name a folder for the report")
     whole = read_corpus(arguments.corpus)
@@ -82,6 +96,7 @@ def run(arguments: argparse.Namespace) -> None:
         arguments.test_kinds,
         arguments.seed,
         classifiers=arguments.classifiers,
+        training=training,
     )
     write_results(metrics, arguments.output, corpus=whole.folder.resolve().name)
     print_results(metrics)
@@ -96,6 +111,7 @@ def measure(
     seed: int,
     *,
     classifiers: Sequence[str] = tuple(NAMES),
+    training: Mapping[str, Any] | None = None,
 ) -> dict:
     """The content of metrics.json.
 
@@ -109,20 +125,24 @@ def measure(
     for protocol in protocols:
         folds = folds_of(examples, protocol=protocol, train_kinds=train_kinds, test_kinds=test_kinds)
         shown = partial(progress, what=f"evaluating {protocol}")
-        found = evaluate(folds, classifiers=classifiers, seed=seed, segments=segments, progress=shown)
+        found = evaluate(
+            folds, classifiers=classifiers, seed=seed, segments=segments, training=training, progress=shown
+        )
         description = {
             "name": protocol,
             "train_kinds": train_kinds,
             "test_kinds": test_kinds,
             "seed": seed,
+            "training": dict(training or {}),
             "folds": [
                 {
                     "signer": fold.signer,
                     "train_takes": [example.take for example in fold.train],
                     "test_takes": [example.take for example in fold.test],
+                    "trained": trained,
                     "classifiers": found.by_signer[fold.signer],
                 }
-                for fold in folds
+                for fold, trained in zip(folds, found.trained, strict=True)
             ],
         }
         if not metrics:
@@ -164,7 +184,7 @@ def write_results(metrics: dict, folder: Path, *, corpus: str) -> None:
     settings = {
         "trained on": ", ".join(metrics["protocol"]["train_kinds"]),
         "tested on": ", ".join(metrics["protocol"]["test_kinds"]),
-        "signers tested": ", ".join(fold["signer"] for fold in folds),
+        "signers tested": ", ".join(dict.fromkeys(fold["signer"] for fold in folds)),
         "takes tested": str(sum(len(fold["test_takes"]) for fold in folds)),
         "seed": str(metrics["protocol"]["seed"]),
         "signface": version("signface"),
@@ -192,6 +212,15 @@ def print_results(metrics: dict) -> None:
         for row in rows:
             print(row[0].ljust(width) + "".join(cell.rjust(20) for cell in row[1:]))
         print()
+    for part in (metrics, *metrics.get("also", {}).values()):
+        title = PROTOCOL_TITLES[part["protocol"]["name"]]
+        for key, what in RELIABILITY.items():
+            scores = {name: sections["manual_segments"][key] for name, sections in part["classifiers"].items()}
+            print(f"{what}, {title}: {', '.join(f'{name} {number(score)}' for name, score in scores.items())}")
+        for how, scores in part.get("intensity", {}).items():
+            told = ", ".join(f"{what} {number(scores[key])}" for key, what in INTENSITY.items())
+            print(f"intensity, {how}, {title}: {told}")
+    print()
     cut = metrics["segmentation"]
     f1 = ", ".join(f"{value:.2f} within {tolerance} s" for tolerance, value in cut["boundary_f1"].items())
     print(f"segments: boundary F1 {f1}; mean IoU {cut['mean_iou']:.2f}; frame agreement {cut['frame_agreement']:.2f}")

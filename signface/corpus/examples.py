@@ -92,4 +92,5 @@ def _examples(
             kind=entry.kind,
             descriptors=descriptors,
             reference=read_reference(entry.annotation, entry.signer),
+            sentence=entry.sentence,
         )

@@ -5,7 +5,7 @@
 - `TakeEntry`, `Corpus`: a row, and all of them with filters by kind and by signer.
 
 The columns are `take`, `signer`, `kind` (required) and `annotation`, `neutral_s`, `video`, `start_s`, `intensity`,
-`face`, `layout` (optional). Paths are relative to the csv. Other columns are left alone.
+`face`, `layout`, `sentence` (optional). Paths are relative to the csv. Other columns are left alone.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from signface.files import whole_file
 
 MANIFEST = "takes.csv"
 REQUIRED = ("take", "signer", "kind")
-OPTIONAL = ("annotation", "neutral_s", "video", "start_s", "intensity", "face", "layout")
+OPTIONAL = ("annotation", "neutral_s", "video", "start_s", "intensity", "face", "layout", "sentence")
 INTENSITIES = (1, 2, 3)
 
 #: How many problems one error spells out; the rest are counted.
@@ -54,6 +54,8 @@ class TakeEntry:
         1, 2 or 3, where the whole take was acted with one intensity.
     face, layout : str, optional
         A shipped name or a path, where this take needs others than the default.
+    sentence : str, optional
+        What is signed: takes of one sentence by one signer are never trained on and tested at once.
     """
 
     path: Path
@@ -66,6 +68,7 @@ class TakeEntry:
     intensity: int | None = None
     face: str | None = None
     layout: str | None = None
+    sentence: str | None = None
 
     @property
     def name(self) -> str:
@@ -283,6 +286,7 @@ def _read_row(row: dict[str, str], folder: Path) -> tuple[TakeEntry | None, list
         intensity=None if intensity is None else int(intensity),
         face=name_or_path("face"),
         layout=name_or_path("layout"),
+        sentence=row.get("sentence") or None,
     )
     return take, problems
 
@@ -330,4 +334,5 @@ def _cells(take: TakeEntry, folder: Path) -> dict[str, str]:
         "intensity": "" if take.intensity is None else str(take.intensity),
         "face": take.face or "",
         "layout": take.layout or "",
+        "sentence": take.sentence or "",
     }

@@ -89,6 +89,11 @@ class Job:
         which = f"{self.number + 1:02d}" if self.kind == "EU" else AFFECTS[self.number]
         return f"{self.signer_name}_{self.kind}_{which}"
 
+    @property
+    def sentence(self) -> str | None:
+        """What is signed, the same for every signer: `07`; None for a take without words."""
+        return f"{self.number + 1:02d}" if self.kind == "EU" else None
+
     def stream(self, *, what: int) -> np.random.Generator:
         """Random numbers of this take for one purpose."""
         key = (self.signer, 1 + KINDS.index(self.kind), self.number, what)
@@ -267,7 +272,7 @@ def write_take(folder: Path, job: Job, made: SyntheticTake) -> TakeEntry:
     write_weights(made.avatar_weights, truth.with_suffix(".parquet"))
     write_weights(made.weights, truth.with_suffix(".signer.parquet"))
     write_segments(made.borders, truth.with_suffix(".segments.csv"))
-    return TakeEntry(recording, job.signer_name, job.kind, annotation, made.neutral_s)
+    return TakeEntry(recording, job.signer_name, job.kind, annotation, made.neutral_s, sentence=job.sentence)
 
 
 def annotation_of(folder: Path, job: Job) -> Path:

@@ -8,9 +8,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,22 +19,31 @@ import pandas as pd
 from signface.errors import SignfaceError
 from signface.evaluate.classification import accuracy_interval, classification_metrics, mcnemar
 from signface.evaluate.segmentation import segmentation_metrics
+from signface.label.calibration import brier_score, expected_calibration_error
+from signface.label.channels import find_intensities
+from signface.label.examples import Example, signer_levels
+from signface.label.folds import groups_of, inner_folds
+from signface.label.intensity import IntensityClassifier, ordinal_metrics
 from signface.label.labellers import NAMES
 from signface.label.labelling import find_segments, label_segments, label_spans
 from signface.label.model import TrainedModel
-from signface.label.training import Example, train_model
+from signface.label.training import train_model
+from signface.label.variants import SignerLevel
 from signface.label.vocabulary import AFFECTS
 from signface.segment.segmentation import segment
 from signface.segment.segments import Segments, value_at
 
 #: name: which takes train the classifier that a signer's test takes are given to.
 PROTOCOLS = {
-    "within": "the training kinds of the same signer",
+    "within": "the training kinds of the same signer; in turns, where they are test kinds too",
     "across": "the training kinds of all other signers",
 }
 
 #: Times per second at which the whole annotation is compared with the reference.
 FRAMES_RATE = 25.0
+
+#: Turns in which a signer's takes are tested, where their kind is trained on as well.
+TURNS = 5
 
 #: What stands for a transition when the whole annotation is compared.
 TRANSITION = "transition"
@@ -41,7 +51,10 @@ TRANSITION = "transition"
 
 @dataclass(frozen=True)
 class Fold:
-    """One signer's test takes and the takes their classifiers are trained on; never the same take in both."""
+    """One signer's test takes and the takes their classifiers are trained on; never the same take in both.
+
+    Nor is a sentence of the same signer, where the corpus names sentences.
+    """
 
     signer: str
     train: tuple[Example, ...]
@@ -54,6 +67,10 @@ class Fold:
                 f"takes would be both trained on and tested: {', '.join(both[:5])}",
                 hint="choose training kinds that are not test kinds",
             )
+        known = {(e.signer, e.sentence) for e in self.train if e.sentence}
+        again = sorted({e.sentence for e in self.test if e.sentence and (e.signer, e.sentence) in known})
+        if again:
+            raise SignfaceError(f"sentences would be both trained on and tested: {', '.join(again[:5])}")
 
 
 @dataclass
@@ -65,18 +82,29 @@ class Evaluation:
     `automatic_segments` (a row a stable segment: `signer, take, kind, start_s, end_s, truth, found, confidence`) and
     its `frames` (a row a frame of 1 / `FRAMES_RATE`: `signer, take, kind, time_s, truth, found`). `truth` is empty
     where the reference has no stable segment. `found` holds the labelled segments of each classifier, by take.
+    `trained` has, for each fold, what each classifier's card says of its `parameters`, `calibration` and `scores` on
+    training takes left out.
     """
 
     metrics: dict
     by_signer: dict[str, dict] = field(default_factory=dict)
     tables: dict[str, dict[str, pd.DataFrame]] = field(default_factory=dict)
     found: dict[str, dict[str, Segments]] = field(default_factory=dict)
+    trained: list[dict[str, dict]] = field(default_factory=list)
 
 
 def folds_of(
-    examples: Sequence[Example], *, protocol: str, train_kinds: Sequence[str], test_kinds: Sequence[str]
+    examples: Sequence[Example],
+    *,
+    protocol: str,
+    train_kinds: Sequence[str],
+    test_kinds: Sequence[str],
+    turns: int = TURNS,
 ) -> list[Fold]:
-    """The folds of a protocol, one for each signer with test takes.
+    """The folds of a protocol: one for each signer with test takes, or several.
+
+    Where `within` trains on a kind that it tests, the test takes of a signer are dealt into turns. Each turn in its
+    turn is tested by what the other takes of the training kinds teach; takes of one sentence stay together.
 
     Parameters
     ----------
@@ -86,11 +114,13 @@ def folds_of(
         One of `PROTOCOLS`.
     train_kinds, test_kinds : sequences of str
         Kinds of takes to train on and to test.
+    turns : int
+        At most as many as a signer has test takes (or sentences).
 
     Raises
     ------
     SignfaceError
-        There is no such protocol, a take would be in both sets, a set is empty, or `across` has one signer only.
+        There is no such protocol, a set is empty, `across` has one signer only, or there are too few takes for turns.
     """
     if protocol not in PROTOCOLS:
         raise SignfaceError(f"there is no protocol named {protocol}", hint=f"choose {' or '.join(PROTOCOLS)}")
@@ -99,15 +129,36 @@ def folds_of(
         raise SignfaceError("an unseen signer needs a corpus of two signers or more", hint="use --protocol within")
     folds = []
     for signer in signers:
-        test = tuple(e for e in examples if e.signer == signer and e.kind in test_kinds)
-        train = tuple(e for e in examples if (e.signer == signer) == (protocol == "within") and e.kind in train_kinds)
+        test = [e for e in examples if e.signer == signer and e.kind in test_kinds]
+        train = [e for e in examples if (e.signer == signer) == (protocol == "within") and e.kind in train_kinds]
         if not test:
             continue
         if not train:
-            raise SignfaceError(f"there is no annotated take to train on for the signer {signer}")
-        folds.append(Fold(signer, train, test))
+            raise SignfaceError(
+                f"there is no annotated take of the kind {', '.join(train_kinds)} to train on for the signer {signer}",
+                hint="choose other training kinds, or another protocol",
+            )
+        both = {e.take for e in train} & {e.take for e in test}
+        folds += _turns(signer, train, test, turns) if both else [Fold(signer, tuple(train), tuple(test))]
     if not folds:
         raise SignfaceError(f"there is no annotated take of the kind {', '.join(test_kinds)} to test")
+    return folds
+
+
+def _turns(signer: str, train: Sequence[Example], test: Sequence[Example], turns: int) -> list[Fold]:
+    """Folds of one signer whose test takes are trained on in the turns of the others."""
+    pairs = inner_folds(test, folds=turns, by_signer=False)
+    if not pairs:
+        raise SignfaceError(
+            f"the signer {signer} has too few takes to test in turns", hint="choose training kinds that are not tested"
+        )
+    folds = []
+    for _, tested in pairs:
+        away = set(groups_of(tested, by_signer=False))
+        kept = [e for e, group in zip(train, groups_of(train, by_signer=False), strict=True) if group not in away]
+        if not kept:
+            raise SignfaceError(f"there is nothing to train on for the signer {signer} in one of the turns")
+        folds.append(Fold(signer, tuple(kept), tuple(tested)))
     return folds
 
 
@@ -117,6 +168,7 @@ def evaluate(
     classifiers: Sequence[str] = tuple(NAMES),
     seed: int = 0,
     segments: dict[str, Segments] | None = None,
+    training: Mapping[str, Any] | None = None,
     progress: Callable[[Sequence[tuple[Fold, str]]], Iterable[tuple[Fold, str]]] = iter,
 ) -> Evaluation:
     """Train every classifier on every fold and compare what it says with the reference.
@@ -128,6 +180,11 @@ def evaluate(
       counted (`without_reference`) and left out.
     - *Frames*: the whole annotation, transitions included, is compared with the reference 25 times a second, with
       all transitions as one further label. This is what an annotator finds on opening the file.
+    - *Intensity*: that of each stable segment of the reference which has one, given its label, by what was learnt from
+      the training takes and by the rule of `signface.label.channels`.
+
+    What chooses parameters or calibrates does so within the training takes of each fold. Where a signer is normalised,
+    it is by the test takes of the fold, of which no label is looked at.
 
     Parameters
     ----------
@@ -138,6 +195,9 @@ def evaluate(
         Seed of the classifiers and of the bootstrap.
     segments : dict of Segments, optional
         Automatic segments of test takes by name, where they are known already.
+    training : mapping, optional
+        What else `signface.label.training.train_model` is told: `features`, `normalise`, `search`, `calibrate` and so
+        on. Sequence models, which make their own features, are not told of `features`.
     progress : callable, optional
         Wraps the list of steps, to show how far it is.
 
@@ -155,16 +215,30 @@ def evaluate(
     }
     own: dict[str, list[tuple[pd.DataFrame, pd.DataFrame]]] = {name: [] for name in classifiers}
     annotated: dict[str, dict[str, Segments]] = {name: {} for name in classifiers}
+    trained: list[dict[str, dict]] = [{} for _ in folds]
+    levels = [signer_levels(fold.test) if (training or {}).get("normalise") == "signer" else {} for fold in folds]
+    strengths: list[pd.DataFrame] = []
+    place = {id(fold): number for number, fold in enumerate(folds)}
     for fold, name in progress([(fold, name) for fold in folds for name in classifiers]):
-        model = train_model(fold.train, classifier=name, seed=seed, name=name)
+        number = place[id(fold)]
+        told = {key: value for key, value in (training or {}).items() if key != "features" or name in NAMES}
+        model = train_model(fold.train, classifier=name, seed=seed, name=name, **told)
+        card = model.card
+        trained[number][name] = {
+            "parameters": dict(card.parameters),
+            "calibration": dict(card.calibration),
+            "scores": dict(card.scores),
+        }
         for example in fold.test:
-            found = known[example.take]
+            found, level = known[example.take], levels[number].get(example.signer)
             if model.sequential:
-                found = find_segments(example.descriptors, model)
+                found = find_segments(example.descriptors, model, level=level)
                 own[name].append((example.reference.table, found.table))
-            compared, annotated[name][example.take] = _compared(example, found, model)
+            compared, annotated[name][example.take] = _compared(example, found, model, level)
             for section, table in compared.items():
                 tables[name][section].append(table)
+            if name == classifiers[0] and model.intensity is not None:
+                strengths.append(_intensities(example, model.intensity))
     pooled = {
         name: {key: pd.concat(parts, ignore_index=True) for key, parts in sections.items()}
         for name, sections in tables.items()
@@ -175,15 +249,17 @@ def evaluate(
         "classifiers": {name: _scores(sections, seed) for name, sections in pooled.items()},
     }
     metrics["segmentation_by_classifier"] = {name: segmentation_metrics(pairs) for name, pairs in own.items() if pairs}
+    if strengths:
+        metrics["intensity"] = _intensity_scores(pd.concat(strengths, ignore_index=True))
     metrics["mcnemar"] = _mcnemar({name: sections["manual_segments"] for name, sections in pooled.items()})
     by_signer = {
-        fold.signer: {
-            name: _scores({key: table[table.signer == fold.signer] for key, table in sections.items()}, seed)
+        signer: {
+            name: _scores({key: table[table.signer == signer] for key, table in sections.items()}, seed)
             for name, sections in pooled.items()
         }
-        for fold in folds
+        for signer in dict.fromkeys(fold.signer for fold in folds)
     }
-    return Evaluation(metrics, by_signer, pooled, annotated)
+    return Evaluation(metrics, by_signer, pooled, annotated, trained)
 
 
 def score_model(model: TrainedModel, test: Sequence[Example], *, seed: int = 0) -> dict:
@@ -205,7 +281,9 @@ def score_model(model: TrainedModel, test: Sequence[Example], *, seed: int = 0) 
     return {**scores, "segmentation": segmentation_metrics(pairs)}
 
 
-def _compared(example: Example, found: Segments, model: TrainedModel) -> tuple[dict[str, pd.DataFrame], Segments]:
+def _compared(
+    example: Example, found: Segments, model: TrainedModel, level: SignerLevel | None = None
+) -> tuple[dict[str, pd.DataFrame], Segments]:
     """The tables of a take (see `Evaluation.tables`), and its labelled segments."""
     descriptors, reference = example.descriptors, example.stable
     manual = reference[["start_s", "end_s", "label"]].rename(columns={"label": "truth"})
@@ -219,8 +297,8 @@ def _compared(example: Example, found: Segments, model: TrainedModel) -> tuple[d
         automatic["found"], automatic["confidence"] = stable["label"], stable["confidence"]
         labelled = found
     else:
-        automatic["found"], automatic["confidence"] = label_spans(descriptors, spans, model)
-        labelled = label_segments(descriptors, found, model)
+        automatic["found"], automatic["confidence"] = label_spans(descriptors, spans, model, level=level)
+        labelled = label_segments(descriptors, found, model, level=level)
     times = np.arange(descriptors.start + 0.5 / FRAMES_RATE, descriptors.start + descriptors.duration, 1 / FRAMES_RATE)
     truth, said = (_annotation_at(segments.table, times) for segments in (example.reference, labelled))
     frames = pd.DataFrame({"time_s": times, "truth": truth, "found": said})[truth != ""]
@@ -254,6 +332,23 @@ def _mcnemar(tables: dict[str, pd.DataFrame]) -> list[dict]:
     ]
 
 
+def _intensities(example: Example, learnt: IntensityClassifier) -> pd.DataFrame:
+    """Intensity of the reference's stable segments that have one: annotated, learnt and by the rule."""
+    ruled = find_intensities(example.descriptors, example.reference)
+    table = example.stable.assign(rule=ruled.table.loc[example.stable.index, "intensity"])
+    table["learnt"] = learnt.predict(
+        example.descriptors, table[["start_s", "end_s"]].to_numpy(float), table["label"].tolist()
+    )
+    if "intensity" not in table:
+        table["intensity"] = None
+    return table[["intensity", "learnt", "rule"]].dropna()
+
+
+def _intensity_scores(table: pd.DataFrame) -> dict:
+    truth = table["intensity"].tolist()
+    return {name: ordinal_metrics(truth, table[name].tolist()) for name in ("learnt", "rule")}
+
+
 def _annotation_at(table: pd.DataFrame, times: np.ndarray) -> np.ndarray:
     """Labels at some times, all transitions as one; empty where nothing is annotated."""
     labels, kinds = value_at(table, "label", times), value_at(table, "kind", times)
@@ -271,6 +366,12 @@ def _scores(sections: dict[str, pd.DataFrame], seed: int) -> dict:
         hits = (judged["truth"] == judged["found"]).tolist()
         result["accuracy_interval"] = accuracy_interval(hits, judged["take"].tolist(), seed=seed)
         result["n_takes"] = int(judged["take"].nunique())
+        if section != "frames":
+            result["calibration_error"], result["brier"] = None, None
+            if len(judged):
+                sure = judged["confidence"].to_numpy(float)
+                result["calibration_error"] = expected_calibration_error(sure, np.array(hits))
+                result["brier"] = brier_score(sure, np.array(hits))
         if section == "automatic_segments":
             result["without_reference"] = int(len(table) - len(judged))
         scores[section] = result
