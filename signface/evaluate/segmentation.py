@@ -1,14 +1,14 @@
 """How well two segmentations of a take agree, on plain tables of segments.
 
-- `boundary_f1`: boundaries found within a tolerance, both ways.
+- `boundary_f1`: boundaries found within a tolerance, both ways; `match_boundaries`: which of them.
 - `mean_iou`: overlap of each segment with its best counterpart.
 - `frame_agreement`: share of the time on which both say stable, or both say transition.
 - `over_segmentation`, `under_segmentation`: segments that are cut into several, either way.
 - `edit_score`: whether the order of the segments is the same.
 - `segmentation_metrics`: all of them over the takes of a corpus.
 
-The first three are symmetric, lie between 0 and 1, and are 1 for equal tables. A table has the columns `start_s`,
-`end_s` and `kind`, in time order. Only the time that both tables cover is compared.
+`boundary_f1`, `mean_iou` and `frame_agreement` are symmetric, lie between 0 and 1, and are 1 for equal tables. A table
+has the columns `start_s`, `end_s` and `kind`, in time order. Only the time that both tables cover is compared.
 """
 
 from __future__ import annotations
@@ -27,8 +27,7 @@ TOLERANCES_S = (0.05, 0.10, 0.20)
 def boundary_f1(reference: pd.DataFrame, found: pd.DataFrame, *, tolerance_s: float = 0.10) -> float:
     """F1 of the boundaries between segments: `2 * matched / (boundaries of one + boundaries of the other)`.
 
-    Each boundary is matched with at most one of the other table, no further than the tolerance, and the number of
-    matches is the largest possible. Where the common time begins and ends is no boundary. 1 if neither table has any.
+    See `match_boundaries`. 1 if neither table has any.
 
     Examples
     --------
@@ -39,6 +38,40 @@ def boundary_f1(reference: pd.DataFrame, found: pd.DataFrame, *, tolerance_s: fl
     """
     matched, total = _matches(reference, found, tolerance_s)
     return 1.0 if total == 0 else 2 * matched / total
+
+
+def match_boundaries(
+    reference: pd.DataFrame, found: pd.DataFrame, *, tolerance_s: float = 0.10
+) -> tuple[np.ndarray, np.ndarray, list[tuple[int, int]]]:
+    """The boundaries of both tables in the time that both cover, and which of them belong together.
+
+    Each is matched with at most one of the other table, no further than the tolerance, and the number of matches is
+    the largest possible. Where the common time begins and ends is no boundary.
+
+    Returns
+    -------
+    (A,) and (B,) arrays of seconds, and pairs of rows of the one and the other.
+
+    Examples
+    --------
+    >>> one = pd.DataFrame({"start_s": [0, 1.0, 2.0], "end_s": [1.0, 2.0, 3.0]})
+    >>> other = pd.DataFrame({"start_s": [0, 1.9], "end_s": [1.9, 3.0]})
+    >>> match_boundaries(one, other, tolerance_s=0.2)[2]
+    [(1, 0)]
+    """
+    span = _common_span(reference, found)
+    first, second = _boundaries(reference, *span), _boundaries(found, *span)
+    pairs = []
+    i = j = 0
+    while i < len(first) and j < len(second):  # with one tolerance for all, taking the earliest pair is optimal
+        if abs(first[i] - second[j]) <= tolerance_s + 1e-9:
+            pairs.append((i, j))
+            i, j = i + 1, j + 1
+        elif first[i] < second[j]:
+            i += 1
+        else:
+            j += 1
+    return first, second, pairs
 
 
 def mean_iou(reference: pd.DataFrame, found: pd.DataFrame) -> float:
@@ -153,17 +186,8 @@ def _boundaries(table: pd.DataFrame, start: float, end: float) -> np.ndarray:
 
 def _matches(reference: pd.DataFrame, found: pd.DataFrame, tolerance_s: float) -> tuple[int, int]:
     """The largest number of pairs within the tolerance, and the number of boundaries of both tables together."""
-    span = _common_span(reference, found)
-    first, second = _boundaries(reference, *span), _boundaries(found, *span)
-    i = j = matched = 0
-    while i < len(first) and j < len(second):  # with one tolerance for all, taking the earliest pair is optimal
-        if abs(first[i] - second[j]) <= tolerance_s + 1e-9:
-            matched, i, j = matched + 1, i + 1, j + 1
-        elif first[i] < second[j]:
-            i += 1
-        else:
-            j += 1
-    return matched, len(first) + len(second)
+    first, second, pairs = match_boundaries(reference, found, tolerance_s=tolerance_s)
+    return len(pairs), len(first) + len(second)
 
 
 def _ious(reference: pd.DataFrame, found: pd.DataFrame) -> np.ndarray:

@@ -1,14 +1,17 @@
 """A take at a glance: its energy curves above its labelled segments (Reverdy 2019, figure 4.3).
 
-- `draw_timeline`: the figure; `draw_timeline_on`: on a part of another.
+- `draw_timeline`: the figure; `draw_timeline_on`: on a part of another; `draw_rows_on`: with any rows of segments.
 - `save_figure`: any figure to a file, whole or not at all.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
@@ -60,28 +63,62 @@ def draw_timeline_on(
     title: str | None = None,
 ) -> None:
     """Draw the timeline on a figure, or on a part of one; see `draw_timeline`."""
+    rows = {"automatic": segments} if reference is None else {"automatic": segments, "reference": reference}
+    draw_rows_on(figure, descriptors, rows, title=title)
+
+
+def draw_rows_on(
+    figure: Figure | SubFigure,
+    descriptors: Descriptors,
+    rows: Mapping[str, Segments],
+    *,
+    title: str | None = None,
+    rate: float | None = None,
+    marks: Mapping[str, np.ndarray] | None = None,
+) -> None:
+    """Draw the energies of a take above any rows of segments, the first on top.
+
+    Parameters
+    ----------
+    figure : Figure or SubFigure
+    descriptors : Descriptors
+    rows : mapping of str to Segments
+        What stands beside each row, and its segments; the transitions of the first shade the curves.
+    title : str, optional
+        The name of the take by default.
+    rate : float, optional
+        Points of the curves per second, where that is fewer than the take has frames: for pages that hold many.
+    marks : mapping of str to (K,) array, optional
+        Row to times of borders that are pointed out on it (seconds).
+    """
     from signface.segment.energy import energies
 
-    rows = [("automatic", segments)] if reference is None else [("automatic", segments), ("reference", reference)]
     curves = energies(descriptors)
+    step = 1 if rate is None else max(1, round((len(curves.time) - 1) / (curves.time[-1] - curves.time[0]) / rate))
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[3, 0.8 * len(rows)])
-    above.plot(curves.time, curves.velocity, color="#0a7e8c", lw=1.3, label="velocity energy (1/s)")
+    above.plot(curves.time[::step], curves.velocity[::step], color="#0a7e8c", lw=1.3, label="velocity energy (1/s)")
     above.plot(
-        curves.time,
-        curves.time_constant_s * curves.acceleration,
+        curves.time[::step],
+        curves.time_constant_s * curves.acceleration[::step],
         color="#d97b00",
         lw=1.0,
         label=f"acceleration energy × {curves.time_constant_s:g} s (1/s)",
     )
-    for row in segments.table.itertuples():
-        if row.kind == "transition":
-            above.axvspan(row.start_s, row.end_s, color="#000000", alpha=0.06, lw=0)
+    first = next(iter(rows.values())).table
+    moving = first[first["kind"] == "transition"]
+    top = 1.18 * above.get_ylim()[1]  # room for the legend
+    if len(moving):
+        spans = list(zip(moving["start_s"], moving["end_s"] - moving["start_s"], strict=True))
+        above.broken_barh(spans, (0, top), color="#000000", alpha=0.06, lw=0)
     above.set_title(title or descriptors.name, loc="left", fontsize=11)
-    above.set_ylim(0, 1.18 * above.get_ylim()[1])  # room for the legend
+    above.set_ylim(0, top)
     above.legend(loc="upper right", fontsize=8, frameon=False, ncols=2)
-    for position, (_, row_segments) in enumerate(reversed(rows)):
-        _draw_segments(below, row_segments, position)
-    below.set_yticks(range(len(rows)), [name for name, _ in reversed(rows)])
+    for position, (name, segments) in enumerate(reversed(list(rows.items()))):
+        _draw_segments(below, segments, position)
+        times = (marks or {}).get(name, np.zeros(0))
+        if len(times):
+            below.plot(times, np.full(len(times), position + 0.4), "v", color="#c00000", ms=4.5, mec="white", mew=0.5)
+    below.set_yticks(range(len(rows)), list(rows)[::-1])
     below.set_ylim(-0.5, len(rows) - 0.5)
     below.set_xlabel("time (s)")
     below.set_xlim(descriptors.start, descriptors.start + descriptors.duration)
@@ -93,17 +130,21 @@ def draw_timeline_on(
 def _draw_segments(axes: Axes, segments: Segments, position: int) -> None:
     """One row of coloured boxes; a label is written where its box is wide enough to hold it."""
     table = segments.table
-    span = table["end_s"].max() - table["start_s"].min() if len(table) else 1.0
-    for row in table.itertuples():
-        label = getattr(row, "label", "" if row.kind == "stable" else "~")
-        width = row.end_s - row.start_s
-        axes.barh(
-            position, width, left=row.start_s, height=0.8, color=colour_of(str(label)), edgecolor="#404040", lw=0.5
-        )
-        if row.kind == "stable" and width > 0.009 * span * max(1, len(str(label))):
-            axes.text(
-                row.start_s + width / 2, position, label, ha="center", va="center", fontsize=8, color=ink_on(label)
-            )
+    if not len(table):
+        return
+    span = table["end_s"].max() - table["start_s"].min()
+    width = (table["end_s"] - table["start_s"]).to_numpy(float)
+    said = table["label"].astype(str) if "label" in table else table["kind"].map({"stable": "", "transition": "~"})
+    axes.broken_barh(
+        list(zip(table["start_s"], width, strict=True)),
+        (position - 0.4, 0.8),
+        facecolors=[colour_of(label) for label in said],
+        edgecolor="#404040",
+        lw=0.5,
+    )
+    for start, own, label, kind in zip(table["start_s"], width, said, table["kind"], strict=True):
+        if kind == "stable" and own > 0.009 * span * max(1, len(label)):
+            axes.text(start + own / 2, position, label, ha="center", va="center", fontsize=8, color=ink_on(label))
 
 
 def save_figure(figure: Figure, path: str | PathLike[str], *, dpi: int = 150) -> None:
