@@ -16,7 +16,7 @@ from signface.face.mesh import Mesh
 from signface.face.model import FaceModel
 from signface.face.reading import read_face
 from signface.face.subdivision import subdivide
-from signface.solve.bounds import holding_curvature, holding_energy, holding_slope
+from signface.solve.bounds import holding_curvature, holding_energy, holding_slope, released
 from signface.solve.methods import METHODS, make_solver
 from signface.solve.newton import minimise, minimise_damped
 from signface.solve.thin_shell import ThinShellSolver
@@ -68,13 +68,13 @@ def test_weights_do_not_depend_on_the_unit_of_length(face, layout, solver, displ
     assert metres.residual == pytest.approx(millimetres.residual / 1000, abs=1e-9)
 
 
-@pytest.mark.parametrize("alpha", [0.3, 0.9])
-def test_weights_hardly_depend_on_how_finely_the_face_is_meshed(face, layout, displacements, alpha):
+@pytest.mark.parametrize(("alpha", "most"), [(0.3, 0.002), (0.9, 0.03)])
+def test_weights_hardly_depend_on_how_finely_the_face_is_meshed(face, layout, displacements, alpha, most):
     finer = subdivide(face)
     assert len(finer.mesh.triangles) == 4 * len(face.mesh.triangles)
     coarse = ThinShellSolver(face, layout, alpha=alpha).solve(displacements[:50]).weights
     fine = ThinShellSolver(finer, layout, alpha=alpha).solve(displacements[:50]).weights
-    assert np.abs(coarse - fine).max() < 0.02
+    assert np.abs(coarse - fine).max() < most
 
 
 def test_weights_do_not_depend_on_the_order_of_the_markers(face, layout, solver, displacements):
@@ -103,6 +103,7 @@ def test_a_general_optimiser_finds_the_same_optimum(face, layout, displacements,
     from scipy.optimize import minimize
 
     solver = ThinShellSolver(face, layout, head_slack=head_slack)
+    once = ThinShellSolver(face, layout, head_slack=head_slack, release=False)
     observed, scale = solver.markers.observed, solver.markers.scale
     count = int(observed.sum())
     points = layout.points(face) - layout.points(face).mean(axis=0)
@@ -116,15 +117,18 @@ def test_a_general_optimiser_finds_the_same_optimum(face, layout, displacements,
     prior[:count, :count] = solver.shell
     prior[count:, count:] = np.eye(6) / (max(head_slack, 1e-9) * scale)
     normal = 2.0 * (columns.T @ columns / scale + prior)
-    for frame in (0, 7, 52):
-        row = displacements[frame].ravel()
+    for frame, which in ((0, once), (7, once), (52, once), (0, solver), (7, solver)):
+        one, row = displacements[frame : frame + 1], displacements[frame].ravel()
+        first = once.solve(one).weights
+        let_go = solver.sparsity * released(first[0, observed]) * (which is solver)
 
-        def energy(x, row=row):
+        def energy(x, row=row, let_go=let_go):
             error = columns @ x - row
-            return error @ error / scale + x @ prior @ x + 0.7 * holding_energy(x[:count], solver.sparsity).sum()
+            held = holding_energy(x[:count], solver.sparsity) - let_go * x[:count]
+            return error @ error / scale + x @ prior @ x + 0.7 * held.sum()
 
-        def slope(x, row=row):
-            held = np.append(0.7 * holding_slope(x[:count], solver.sparsity), np.zeros(6))
+        def slope(x, row=row, let_go=let_go):
+            held = np.append(0.7 * (holding_slope(x[:count], solver.sparsity) - let_go), np.zeros(6))
             return normal @ x - 2.0 * columns.T @ row / scale + held
 
         def curvature(x):
@@ -138,9 +142,9 @@ def test_a_general_optimiser_finds_the_same_optimum(face, layout, displacements,
             method="trust-exact",
             options={"gtol": 1e-10, "maxiter": 2000},
         )
-        ours = solver.solve(displacements[frame : frame + 1]).weights
+        ours = which.solve(one).weights
         assert np.abs(ours[0, observed] - found.x[:count]).max() < 1e-6
-        assert solver.energy(ours, displacements[frame : frame + 1])[0] == pytest.approx(found.fun, rel=1e-7)
+        assert which.energy(ours, one, first if which is solver else None)[0] == pytest.approx(found.fun, rel=1e-7)
 
 
 def test_a_head_pose_that_is_a_little_off_makes_no_expression(face, layout):
@@ -260,7 +264,7 @@ def test_uncertainty_grows_with_marker_error_and_missing_information(solver, dis
     observed = solver.markers.observed
     np.testing.assert_allclose(large[:, observed], 2 * small[:, observed])
     assert np.isnan(small[:, ~observed]).all()
-    jaw, lid = solver.names.index("jawOpen"), solver.names.index("eyeSquintLeft")
+    jaw, lid = solver.names.index("jawOpen"), solver.names.index("eyeSquintRight")
     free = ((weights[:, [jaw, lid]] > 0.1) & (weights[:, [jaw, lid]] < 1.0)).all(axis=1)
     assert free.any()
     assert (small[free][:, jaw] < small[free][:, lid]).all()

@@ -15,6 +15,10 @@ its range is biased.
 **Rest.** A face at any moment uses few of its bases. `rest(c)` is 0 for c <= 0 and rises as `c` beyond a short parabola
 (up to `KNEE`), so that its slope is continuous and zero at rest. Multiplied by a small `sparsity`, it decides between
 explanations that the markers hardly tell apart in favour of the one with fewer, weaker bases.
+
+**Release.** The same pull that decides which bases act also makes those that do weaker than they are. Once the first
+solve has said which are clearly active, it has done its work, and a second solve lets them go (`released`), as the
+relaxed lasso does (N. Meinshausen, Computational Statistics & Data Analysis 52, 2007). Each solve is convex.
 """
 
 from __future__ import annotations
@@ -31,6 +35,9 @@ AT_REST = float(np.exp(LOWER / SMOOTHING))
 
 #: Where the rest energy turns from a parabola into a straight line.
 KNEE = 0.02
+
+#: Weights of the first solve between which the rest energy lets go of a base: not at all, altogether.
+RELEASE = (0.1, 0.4)
 
 
 def _outside(weights: np.ndarray) -> np.ndarray:
@@ -58,3 +65,8 @@ def holding_curvature(weights: np.ndarray, sparsity: float) -> np.ndarray:
     beyond = _outside(weights)
     bounds = np.where(beyond == 0.0, 0.0, (AT_REST / SMOOTHING**2) * np.exp(np.abs(beyond) / SMOOTHING))
     return bounds + np.where((weights >= 0.0) & (weights < KNEE), sparsity / KNEE, 0.0)
+
+
+def released(weights: np.ndarray) -> np.ndarray:
+    """Share of the rest energy's pull that the second solve leaves out, 0 to 1, by the weights of the first."""
+    return np.clip((weights - RELEASE[0]) / (RELEASE[1] - RELEASE[0]), 0.0, 1.0)
