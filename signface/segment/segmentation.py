@@ -9,7 +9,6 @@ from itertools import pairwise
 
 import numpy as np
 import pandas as pd
-from scipy.signal import find_peaks
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
@@ -119,6 +118,8 @@ def _threshold(
 
 def _around_peaks(curves: Energies, threshold: float, floor: float, extent: float) -> list[tuple[float, float]]:
     """Start and end of the movement around each peak that is prominent enough, in the order of the peaks."""
+    from scipy.signal import find_peaks  # slow to import, and sequence models do without
+
     activity, time = curves.activity, curves.time
     # A movement that the recording cuts off peaks at its first or last frame: padded, that is a peak as well.
     peaks, _ = find_peaks(np.concatenate(([floor], activity, [floor])), prominence=threshold)
