@@ -1,158 +1,404 @@
 """The inner loop of the thin-shell solve: one small convex problem a frame, compiled.
 
 Each frame minimises `c' A c - 2 r' c + sum_i H(c_i)`, with `H` the energy that holds weights in range and at rest
-(`signface.solve.bounds`). Two things make it cheap. `A` is the same in every frame, so that its inverse is computed
-once. And the slope of `H` is one constant, `pull`, between the knee (0, or `KNEE` with sparsity) and 1: with
-`c0 = A^-1 (r - pull / 2)`, one matrix product for all frames, and `G = A^-1 / 2`, the optimum satisfies
+(`signface.solve.bounds`): `2 A c - 2 r + H'(c) = 0`. `A` is the same in every frame, and the slope `H'` is nearly a
+piecewise linear function: straight below 0 (optima lie so little below that the exponential hardly bends), straight
+in the knee of the rest energy, constant from there to 1, straight above 1. As long as no weight passes from one piece
+to another, the step to a frame's optimum is the same matrix, `(2 A + diag(H''))^-1`, times the change of `r`.
 
-    c = c0 - G g(c),        g_i(c) = H'(c_i) - pull,
+So this inverse is kept from frame to frame. In each frame
 
-where only the k weights outside knee to 1 enter `g`. A Newton step is a Cholesky factorisation of k x k, k being about
-20 of 51, and k columns of `G`; consecutive frames start from one another and take two or three steps.
+1. a step with it follows the change of the markers;
+2. the slopes are evaluated at the new weights. For each weight that has come to another piece (1.2 a frame at 200 Hz),
+   or whose curvature is off by more than a fifth, the inverse is corrected by a matrix of rank one (Sherman and
+   Morrison). Where the slopes differ from what the step took them to be, which is at few weights, another step is taken
+   from those alone;
+3. when they no longer differ, the gradient is computed afresh from `A`. It is what decides whether the frame is solved.
+   The inverse only proposes steps, and its rounding errors cannot enter the result.
 
+Nothing is factorised, and a frame costs a dozen products of a 48 x 48 matrix with a vector or with a few of its
+entries. Each matrix is padded with weights that nothing moves, so that its rows are whole vector registers.
+
+- `Problem`: what the frames that show the same markers share.
 - `minimise`: all frames, on several cores.
-- `minimise_damped`: the same for single frames by Newton's method with a line search: slower, and sure.
+- `minimise_damped`: single frames by Newton's method with a line search: slower, and sure.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from math import exp, inf, isfinite, log1p, sqrt
 
 import numba
 import numpy as np
 
-from signface.solve.bounds import AT_REST, KNEE, SMOOTHING, holding_curvature, holding_energy, holding_slope
+from signface.solve.bounds import (
+    AT_REST,
+    KNEE,
+    RELEASE,
+    SMOOTHING,
+    holding_curvature,
+    holding_energy,
+    holding_slope,
+    released,
+)
 
-#: Newton steps after which a frame is left to the damped method. The longest seen are 12.
-QUICK_STEPS = 30
+#: Steps after which a frame is left to the damped method.
+QUICK_STEPS = 40
 #: Steps of the damped method, each halving the gradient at worst near the optimum.
 DAMPED_STEPS = 400
+#: A curvature in the kept inverse may be off by this share.
+OFF = 0.2
+#: The kept inverse is made anew after so many frames: each correction rounds.
+RENEW = 256
+#: Up to this distance outside 0 to 1 the exponential is summed as a series, without a call.
+NEAR = SMOOTHING / 4
+#: Frames taken together where matrices are multiplied, so that a row of the matrix is read once for four of them.
+BLOCK = 32
+#: Weights are padded to a multiple of this: two vector registers of eight.
+PADDING = 16
 #: Frames under which a second thread costs more than it gives.
-FRAMES_PER_THREAD = 256
+FRAMES_PER_THREAD = 1024
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
-def _solve_frames(base, inverse, stiffness, pull, tolerance, first, result, steps):
-    """Solve frames one after the other from `first`; `steps` counts Newton's steps, 0 in a frame left unsolved.
+def _compiled(function: Callable) -> Callable:
+    """The function compiled at its first call, without the interpreter's lock, and kept on disk for the next process.
 
-    `stiffness` is the slope unit of the bounds (weight * AT_REST / SMOOTHING), `pull` the slope of the rest energy.
+    Numba keeps it beside this file, or in the user's cache folder where that is read-only. Where neither can be
+    written, every process compiles for itself.
     """
-    frames, n = base.shape
+    make = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
+    made = make(function)
+    with contextlib.suppress(RuntimeError):
+        made.enable_caching()
+    return made
+
+
+@_compiled
+def _products(rows, begin, end, matrix, out):
+    """`out[f - begin, i] = rows[f] . matrix[i]` for the rows from `begin` to `end`, four by two at a time."""
+    for f0 in range(begin, end, 4):
+        f1, f2, f3 = min(f0 + 1, end - 1), min(f0 + 2, end - 1), min(f0 + 3, end - 1)
+        for i in range(0, len(matrix), 2):
+            s00 = s01 = s10 = s11 = s20 = s21 = s30 = s31 = 0.0
+            for j in range(matrix.shape[1]):
+                u, v = matrix[i, j], matrix[i + 1, j]
+                s00 += rows[f0, j] * u
+                s01 += rows[f0, j] * v
+                s10 += rows[f1, j] * u
+                s11 += rows[f1, j] * v
+                s20 += rows[f2, j] * u
+                s21 += rows[f2, j] * v
+                s30 += rows[f3, j] * u
+                s31 += rows[f3, j] * v
+            out[f0 - begin, i], out[f0 - begin, i + 1] = s00, s01
+            out[f1 - begin, i], out[f1 - begin, i + 1] = s10, s11
+            out[f2 - begin, i], out[f2 - begin, i + 1] = s20, s21
+            out[f3 - begin, i], out[f3 - begin, i + 1] = s30, s31
+
+
+@_compiled
+def _combine(matrix, factors, which, some, out):
+    """`out`, the sum of `factors[i] * matrix[i]` over the first `some` entries `i` of `which`."""
+    for i in range(len(out)):
+        out[i] = 0.0
+    k = 0
+    while k + 4 <= some:
+        i0, i1, i2, i3 = which[k], which[k + 1], which[k + 2], which[k + 3]
+        f0, f1, f2, f3 = factors[i0], factors[i1], factors[i2], factors[i3]
+        for i in range(len(out)):
+            out[i] += f0 * matrix[i0, i] + f1 * matrix[i1, i] + f2 * matrix[i2, i] + f3 * matrix[i3, i]
+        k += 4
+    while k < some:
+        i0 = which[k]
+        f0 = factors[i0]
+        for i in range(len(out)):
+            out[i] += f0 * matrix[i0, i]
+        k += 1
+
+
+@_compiled
+def _correct(inverse, i, change, row):
+    """Make `inverse` that of a matrix whose entry (i, i) is greater by `change`; `row` is room to work in."""
+    for j in range(len(row)):
+        row[j] = inverse[i, j]
+    factor = change / (1.0 + change * row[i])
+    for j in range(len(row)):
+        part = factor * row[j]
+        for k in range(len(row)):
+            inverse[j, k] -= part * row[k]
+
+
+@_compiled
+def _follow(right, many, quad, free, stiffness, pull, tolerance, inverse, state, which, age, solved, steps):
+    """Solve the frames of a block, one after the other: `2 A c - right[k] + H'(c) = 0` for `k < many`.
+
+    `state` and `inverse` carry over what the next block starts from: the weights in `state[0]`, the slopes taken, and
+    the inverse for those; `age` is for how many frames it has been corrected, and is returned. `steps` counts a frame's
+    steps, or becomes -2 where they did not lead to the optimum. Frames with a negative count are left out.
+    """
+    n = len(quad)
     knee = KNEE if pull > 0.0 else 0.0
     lean = pull / KNEE
-    active = np.empty(n, dtype=np.int64)
-    factor = np.empty((n, n))
-    force = np.empty(n)
-    push = np.zeros(n)
-    weights = np.empty(n)
-    start = first.copy()
-    for frame in range(frames):
-        origin = base[frame]
-        for step in range(QUICK_STEPS):
-            # Where g is taken as g(start) + D (c - start): (D^-1 + G_SS) force = c0_S + D^-1 g - start_S.
-            count = 0
-            for i in range(n):
-                if start[i] < knee or start[i] > 1.0:
-                    active[count] = i
-                    count += 1
-            for row in range(count):
-                i = active[row]
-                if start[i] < 0.0 or start[i] > 1.0:
-                    beyond = start[i] if start[i] < 0.0 else start[i] - 1.0
-                    growth = np.exp(abs(beyond) / SMOOTHING)
-                    softness = SMOOTHING / (stiffness * growth)
-                    slope = stiffness * (growth - 1.0) if beyond > 0.0 else -stiffness * (growth - 1.0) - pull
-                else:
-                    softness = 1.0 / lean
-                    slope = lean * start[i] - pull
-                force[row] = origin[i] + slope * softness - start[i]
-                line = inverse[i]
-                for column in range(row):
-                    factor[row, column] = line[active[column]]
-                factor[row, row] = line[i] + softness
-            for row in range(count):
-                for column in range(row):
-                    total = factor[row, column]
-                    for k in range(column):
-                        total -= factor[row, k] * factor[column, k]
-                    factor[row, column] = total * factor[column, column]
-                total = factor[row, row]
-                value = force[row]
-                for k in range(row):
-                    total -= factor[row, k] * factor[row, k]
-                    value -= factor[row, k] * force[k]
-                factor[row, row] = 1.0 / np.sqrt(total)
-                force[row] = value * factor[row, row]
-            for row in range(count - 1, -1, -1):
-                value = force[row] * factor[row, row]
-                force[row] = value
-                for k in range(row):
-                    force[k] -= factor[row, k] * value
-            for i in range(n):
-                weights[i] = origin[i]
-            for row in range(count):
-                value = force[row]
-                push[active[row]] = value
-                line = inverse[active[row]]
-                for i in range(n):
-                    weights[i] -= line[i] * value
-            # The gradient of the energy is g where the weights now are, less the g that the step took them to have.
-            # The next linearisation is at the weight, or where g is as the step took it (for a weight that the step
-            # took to be inside: one smoothing outside), whichever is less far outside: the exponential would throw
-            # the step away otherwise.
-            worst = 0.0
-            for i in range(n):
-                taken, weight = push[i], weights[i]
-                push[i] = 0.0
-                start[i] = weight
-                wanted = 0.0
-                if weight < 0.0:
-                    wanted = -stiffness * (np.exp(-weight / SMOOTHING) - 1.0) - pull
-                    if taken < -pull:
-                        start[i] = max(weight, -SMOOTHING * np.log1p((-taken - pull) / stiffness))
-                    else:
-                        start[i] = max(weight, -SMOOTHING)
-                elif weight < knee:
-                    wanted = lean * weight - pull
-                elif weight > 1.0:
-                    wanted = stiffness * (np.exp((weight - 1.0) / SMOOTHING) - 1.0)
-                    if taken > 0.0:
-                        start[i] = min(weight, 1.0 + SMOOTHING * np.log1p(taken / stiffness))
-                    else:
-                        start[i] = min(weight, 1.0 + SMOOTHING)
-                worst = max(worst, abs(wanted - taken))
-            if worst <= tolerance:
-                steps[frame] = step + 1
-                break
+    stiff = stiffness / SMOOTHING
+    # Slopes are taken to be `taken + curve * (c - weight)` around the weights `weight`; `true` and `bend` are the
+    # slopes and curvatures there. `balance` is 2 A weight.
+    weight, curve, taken, true, bend = state[0], state[1], state[2], state[3], state[4]
+    balance, error, move = state[5], state[6], state[7]
+    for frame in range(many):
+        if steps[frame] < 0:
+            continue
+        steps[frame] = -2
+        some = n
         for i in range(n):
-            result[frame, i] = weights[i]
+            which[i] = i
+        if age >= RENEW:
+            age = 0
+            for i in range(n):
+                for j in range(n):
+                    inverse[i, j] = free[i, j]
+            for i in range(n):
+                c = weight[i]
+                curve[i], taken[i] = 0.0, pull
+                if c < 0.0:
+                    curve[i], taken[i] = stiff, stiff * c
+                elif c < knee:
+                    curve[i], taken[i] = lean, lean * c
+                elif c > 1.0:
+                    curve[i], taken[i] = stiff, pull + stiff * (c - 1.0)
+                if curve[i] > 0.0:
+                    _correct(inverse, i, curve[i], move)
+            _combine(quad, weight, which, n, balance)
+        age += 1
+        for i in range(n):
+            error[i] = balance[i] + taken[i] - right[frame, i]
+        for step in range(QUICK_STEPS):
+            _combine(inverse, error, which, some, move)
+            for i in range(n):
+                taken[i] -= curve[i] * move[i]
+            for i in range(n):
+                weight[i] -= move[i]
+            # Short loops over few arrays each, so that the compiler can make vectors of them.
+            farthest = 0.0
+            for i in range(n):
+                below = -weight[i] if weight[i] < 0.0 else 0.0
+                above = weight[i] - 1.0 if weight[i] > 1.0 else 0.0
+                move[i] = below + above
+            for i in range(n):
+                farthest = max(farthest, move[i])
+            for i in range(n):  # exp(x) - 1
+                x = min(move[i], NEAR) / SMOOTHING
+                high = 1 + x / 5 * (1 + x / 6 * (1 + x / 7 * (1 + x / 8 * (1 + x / 9))))
+                move[i] = x * (1 + x / 2 * (1 + x / 3 * (1 + x / 4 * high)))
+            for i in range(n):
+                resting = max(0.0, min(weight[i], knee))
+                held = stiffness * move[i]
+                true[i] = lean * resting + (-held if weight[i] < 0.0 else held)
+            for i in range(n):
+                inside = lean if weight[i] < knee else 0.0
+                held = stiff * (move[i] + 1.0)
+                bend[i] = held if weight[i] < 0.0 or weight[i] > 1.0 else inside
+            if farthest > NEAR and stiffness > 0.0:
+                for i in range(n):
+                    far = -weight[i] if weight[i] < 0.0 else weight[i] - 1.0
+                    if far <= NEAR:
+                        continue
+                    # Far outside, the exponential would throw the next step away. It is linearised no further out than
+                    # where its slope is what the last step took it to be, or one smoothing.
+                    x = far
+                    if far > SMOOTHING:
+                        force = -taken[i] if weight[i] < 0.0 else taken[i] - pull
+                        x = min(far, max(SMOOTHING, SMOOTHING * log1p(max(force, 0.0) / stiffness)))
+                    if x < far:
+                        farthest = inf
+                    bend[i] = stiff * exp(x / SMOOTHING)
+                    held = bend[i] * SMOOTHING - stiffness + bend[i] * (far - x)
+                    true[i] = -held if weight[i] < 0.0 else pull + held
+            total = 0.0
+            for i in range(n):
+                apart = true[i] - taken[i]
+                error[i] = apart
+                total += apart * apart
+            for i in range(n):
+                taken[i] = true[i]
+            if total <= tolerance * tolerance and farthest < inf:
+                for i in range(n):
+                    which[i] = i
+                _combine(quad, weight, which, n, balance)
+                total = 0.0
+                for i in range(n):
+                    apart = balance[i] + taken[i] - right[frame, i]
+                    error[i] = apart
+                    total += apart * apart
+                if total <= 4.0 * tolerance * tolerance:
+                    steps[frame] = step + 1
+                    break
+            some = 0
+            for i in range(n):
+                which[some] = i
+                some += abs(error[i]) > 0.01 * tolerance
+                if abs(bend[i] - curve[i]) > OFF * bend[i]:
+                    _correct(inverse, i, bend[i] - curve[i], move)
+                    curve[i] = bend[i]
+        for i in range(n):
+            solved[frame, i] = weight[i]
+        if steps[frame] < 0:
+            age = RENEW
+            for i in range(n):
+                weight[i] = 0.0
+    return age
+
+
+@_compiled
+def _solve_frames(
+    rows, project, quad, free, bases, places, count, stiffness, pull, turns, tolerance,
+    inverse, state, which, ages, right, solved, placed, done, weights, residual, steps,
+):  # fmt: skip
+    """Solve consecutive frames; see `Problem.solve`. `steps` becomes -1 in frames of which `rows` has a NaN.
+
+    Of two turns, the second lets go of the weights that the first found active (`signface.solve.bounds.released`). They
+    take turns block by block, and each goes on from its own last frame.
+    """
+    n = len(quad)
+    for begin in range(0, len(rows), len(right)):
+        end = min(begin + len(right), len(rows))
+        _products(rows, begin, end, project, right)
+        for frame in range(end - begin):
+            total = 0.0
+            for i in range(n):
+                total += right[frame, i]
+                solved[frame, i] = 0.0
+            done[frame] = 0 if isfinite(total) else -1
+        for turn in range(turns):
+            if turn == 1:
+                for frame in range(end - begin):
+                    for i in range(n):
+                        share = (solved[frame, i] - RELEASE[0]) / (RELEASE[1] - RELEASE[0])
+                        right[frame, i] += pull * max(0.0, min(share, 1.0))
+            ages[turn] = _follow(
+                right, end - begin, quad, free, stiffness, pull, tolerance,
+                inverse[turn], state[turn], which, ages[turn], solved, done,
+            )  # fmt: skip
+        _products(solved, 0, end - begin, bases, placed)
+        for frame in range(end - begin):
+            total = 0.0
+            for j in range(rows.shape[1]):
+                apart = placed[frame, j] - rows[begin + frame, j]
+                total += apart * apart
+            residual[begin + frame] = sqrt(total / count)
+            steps[begin + frame] = done[frame]
+            for i in range(len(places)):
+                weights[begin + frame, places[i]] = solved[frame, i]
+
+
+class Problem:
+    """What the frames that show the same markers share: `c' A c - 2 r' c`, with `r` linear in the markers.
+
+    Parameters
+    ----------
+    normal : (n, n) array
+        `A`, symmetric and positive definite.
+    inverse : (n, n) array
+        `A^-1`, symmetric.
+    project : (n, k) array
+        `r = project @ row` for the k marker coordinates `row` of a frame.
+    bases : (k, n) array
+        The marker coordinates that weights give, for the residual; rows of missing markers are 0.
+    count : int
+        Number of markers present.
+    places : (n,) int array
+        Where the n weights stand among all.
+    width : int
+        Number of all weights; those not named by `places` are 0.
+    """
+
+    def __init__(
+        self,
+        normal: np.ndarray,
+        inverse: np.ndarray,
+        project: np.ndarray,
+        bases: np.ndarray,
+        *,
+        count: int,
+        places: np.ndarray,
+        width: int,
+    ) -> None:
+        self.normal, self.project, self.count, self.width = normal, project, count, width
+        self.places = np.ascontiguousarray(places, dtype=np.int64)
+        n = len(normal)
+        padded = n + -n % PADDING
+        self._quad, self._free = np.eye(padded), np.eye(padded)
+        self._quad[:n, :n], self._free[:n, :n] = 2.0 * normal, 0.5 * inverse
+        self._project = np.zeros((padded, project.shape[1]))
+        self._project[:n] = 2.0 * project
+        self._bases = np.zeros((len(bases) + len(bases) % 2, padded))
+        self._bases[: len(bases), :n] = bases
+
+    def solve(
+        self,
+        rows: np.ndarray,
+        first: np.ndarray | None,
+        stiffness: float,
+        pull: float,
+        release: bool,
+        tolerance: float,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Weights, residuals and numbers of steps of consecutive frames, in this thread.
+
+        `stiffness` is the slope unit of the bounds (weight * AT_REST / SMOOTHING), `pull` the slope of the rest energy.
+        The number of steps is -1 in frames with a NaN, -2 in those not solved.
+        """
+        padded, turns = len(self._quad), 1 + release
+        state = np.zeros((turns, 8, padded))
+        if first is not None:
+            state[:, 0, : len(first)] = first
+        weights, residual = np.zeros((len(rows), self.width)), np.empty(len(rows))
+        steps = np.empty(len(rows), dtype=np.int64)
+        _solve_frames(
+            rows, self._project, self._quad, self._free, self._bases, self.places, float(self.count),
+            stiffness, pull, turns, tolerance,
+            np.empty((turns, padded, padded)), state, np.empty(padded, dtype=np.int64),
+            np.full(turns, RENEW), np.empty((BLOCK, padded)), np.empty((BLOCK, padded)),
+            np.empty((BLOCK, len(self._bases))), np.empty(BLOCK, dtype=np.int64),
+            weights, residual, steps,
+        )  # fmt: skip
+        return weights, residual, steps
+
+    def residual(self, weights: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """(F,) root mean square distance between the given and the solved markers for (F, n) weights."""
+        apart = weights @ self._bases[: rows.shape[1], : weights.shape[1]].T - rows
+        return np.sqrt(np.einsum("fk,fk->f", apart, apart) / self.count)
 
 
 def minimise(
-    base: np.ndarray,
-    inverse: np.ndarray,
+    rows: np.ndarray,
+    problem: Problem,
     *,
     bounds: float,
     sparsity: float,
     tolerance: float,
+    release: bool = False,
     first: np.ndarray | None = None,
     threads: int | None = None,
-) -> np.ndarray:
-    """Weights at the optimum of every frame.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Weights at the optimum of every frame, and how far from the markers they leave the face.
 
     Parameters
     ----------
-    base : (F, n) array
-        `A^-1 r`, the optimum without holding energy.
-    inverse : (n, n) array
-        `A^-1`, symmetric.
+    rows : (F, k) array
+        Marker coordinates.
+    problem : Problem
     bounds : float
         Weight of the holding energy; 0 leaves it out.
     sparsity : float
         Weight of the rest energy within it.
     tolerance : float
-        The largest component of the gradient at which a frame counts as solved.
+        The length of the gradient at which a frame counts as solved.
+    release : bool
+        Solve a second time without the rest energy of clearly active weights.
     first : (n,) array, optional
         Weights to start frame 0 from.
     threads : int, optional
@@ -160,36 +406,38 @@ def minimise(
 
     Returns
     -------
-    (F, n) array
+    (F, width) array
+        The weights. Frames of which `rows` has a NaN are not solved.
+    (F,) array
+        Root mean square distance of the markers, NaN in the frames not solved.
     """
-    if bounds == 0.0 or not len(base):
-        return base.copy()
-    pull = bounds * sparsity
-    half = np.ascontiguousarray(inverse / 2.0)
-    base = base - pull * half.sum(axis=0)
-    result, steps = np.empty_like(base), np.zeros(len(base), dtype=np.int64)
-    stiffness = bounds * AT_REST / SMOOTHING
-
-    def part(start: int, stop: int) -> None:
-        opening = np.clip(base[start], -0.05, 1.05) if first is None or start else np.clip(first, -0.05, 1.05)
-        _solve_frames(
-            base[start:stop], half, stiffness, pull, tolerance, opening, result[start:stop], steps[start:stop]
-        )
-
-    threads = len(os.sched_getaffinity(0)) if threads is None and hasattr(os, "sched_getaffinity") else threads or 1
-    pieces = min(threads, max(1, len(base) // FRAMES_PER_THREAD))
-    cuts = np.linspace(0, len(base), pieces + 1).astype(int)
-    if pieces == 1:
-        part(0, len(base))
+    rows = np.require(rows, np.float64, ["C", "W"])
+    how = (bounds * AT_REST / SMOOTHING, bounds * sparsity, release, tolerance)
+    if threads is None:
+        threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    spans = min(threads, max(1, len(rows) // FRAMES_PER_THREAD))
+    if spans == 1:
+        weights, residual, steps = problem.solve(rows, first, *how)
     else:
-        with ThreadPoolExecutor(pieces) as pool:
-            list(pool.map(part, cuts[:-1], cuts[1:]))
-    left = np.flatnonzero(steps == 0)
+        cuts = np.linspace(0, len(rows), spans + 1).astype(int)
+        with ThreadPoolExecutor(spans) as pool:
+            parts = pool.map(
+                lambda start, stop: problem.solve(rows[start:stop], first if start == 0 else None, *how),
+                cuts[:-1],
+                cuts[1:],
+            )
+            weights, residual, steps = (np.concatenate(part) for part in zip(*parts))
+    residual[steps == -1] = np.nan
+    left = np.flatnonzero(steps == -2)
     if len(left):
-        normal = np.linalg.inv(inverse)
-        right = (base[left] + pull * half.sum(axis=0)) @ normal
-        result[left] = minimise_damped(normal, right, bounds=bounds, sparsity=sparsity, tolerance=tolerance)
-    return result
+        right = rows[left] @ problem.project.T
+        own = minimise_damped(problem.normal, right, bounds=bounds, sparsity=sparsity, tolerance=tolerance)
+        if release:
+            right = right + 0.5 * bounds * sparsity * released(own)
+            own = minimise_damped(problem.normal, right, bounds=bounds, sparsity=sparsity, tolerance=tolerance)
+        weights[np.ix_(left, problem.places)] = own
+        residual[left] = problem.residual(own, rows[left])
+    return weights, residual
 
 
 def minimise_damped(

@@ -169,15 +169,26 @@ class MarkerBases:
         SignfaceError
             The shape does not fit the layout.
         """
+        rows = self.rows(displacements)
+        present = np.isfinite(rows).reshape(len(rows), -1, 3).all(axis=2)
+        if not present.all():
+            rows = np.where(np.repeat(present, 3, axis=1), rows, 0.0)
+        return rows, present
+
+    def rows(self, displacements: np.ndarray) -> np.ndarray:
+        """The displacements as (F, 3P) rows, whatever they hold.
+
+        Raises
+        ------
+        SignfaceError
+            The shape does not fit the layout.
+        """
         displacements = np.asarray(displacements, dtype=np.float64)
         if displacements.ndim != 3 or displacements.shape[1:] != (self.n_markers, 3):
             raise SignfaceError(
                 f"displacements must have the shape (frames, {self.n_markers}, 3), not {displacements.shape}"
             )
-        present = np.isfinite(displacements).all(axis=2)
-        if not present.all():
-            displacements = np.where(present[:, :, None], displacements, 0.0)
-        return displacements.reshape(len(displacements), -1), present
+        return displacements.reshape(len(displacements), -1)
 
     def solution(self, weights: np.ndarray, rows: np.ndarray, present: np.ndarray) -> Solution:
         """The `Solution` of solved weights: the residual over the markers present, NaN where there is none."""

@@ -20,7 +20,9 @@ with the subdivision of the mesh. Eq. 5.25 leaves out the rows of the vertices w
 energy is proportional to the area around it: 40 vertices of 3,400 hold a hundredth of it, which vanishes as the mesh is
 refined, so nothing is left out here. `docs/solver.md` has the figures.
 
-The energy is convex and has one minimum: weights that the markers leave undetermined are held by the shell.
+The energy is convex and has one minimum: weights that the markers leave undetermined are held by the shell. Rest
+shrinks what it holds, so that a second solve, as convex, lets go of the weights that the first found clearly active
+(`signface.solve.bounds.released`).
 """
 
 from __future__ import annotations
@@ -31,8 +33,8 @@ from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.face.operators import thin_shell_matrices
-from signface.solve.bounds import holding_curvature, holding_energy
-from signface.solve.newton import minimise
+from signface.solve.bounds import holding_curvature, holding_energy, released
+from signface.solve.newton import Problem, minimise
 from signface.solve.solver import MarkerBases, Solution, presence_patterns
 
 #: How much the shell counts beside the markers: a typical base's shell energy weighs as much as missing the markers
@@ -41,11 +43,11 @@ TOLERANCE = 0.05
 #: The weight of the thin shell that the thesis settles on (5.3, 6.3).
 ALPHA = 0.3
 #: Weight of the rest energy.
-SPARSITY = 0.004
+SPARSITY = 0.006
 #: Variance of the head's residual shift (and of its turn, at the markers' distance from their centre) beside that of a
 #: marker's coordinate.
 HEAD_SLACK = 0.3
-#: The largest component of the gradient at which a frame counts as solved. Energies are of the order of 1.
+#: The length of the gradient at which a frame counts as solved. Energies are of the order of 1.
 GRADIENT = 1e-8
 #: Frames solved at a time, so that a long take needs little memory.
 CHUNK = 16384
@@ -62,6 +64,9 @@ class ThinShellSolver:
         Weight of the thin shell, from 0 (only bounds and rest regularise) to 1 (only the shell does).
     sparsity : float
         Weight of the rest energy, 0 or more: what decides between explanations that the markers hardly tell apart.
+    release : bool
+        Solve a second time without the rest energy of the weights that are clearly active, so that expressions are not
+        weakened by it.
     head_slack : float
         How far the head's motion may have been taken away wrongly, 0 or more; 0 trusts the head markers.
     signer_bases : (N, P, 3) array, optional
@@ -95,6 +100,7 @@ class ThinShellSolver:
         *,
         alpha: float = ALPHA,
         sparsity: float = SPARSITY,
+        release: bool = True,
         head_slack: float = HEAD_SLACK,
         signer_bases: np.ndarray | None = None,
         threads: int | None = None,
@@ -107,6 +113,7 @@ class ThinShellSolver:
             raise SignfaceError(f"head_slack must be 0 or more, not {head_slack}")
         self.names = face.names
         self.alpha, self.sparsity, self.threads = float(alpha), float(sparsity), threads
+        self.release = release and self.sparsity > 0.0 and self.alpha < 1.0
         self.markers = MarkerBases(face, layout, skin=self.alpha > 0.0, signer_bases=signer_bases)
         observed = self.markers.observed
         shell = np.zeros((int(observed.sum()),) * 2)
@@ -130,12 +137,16 @@ class ThinShellSolver:
         full[own, own] += 1e-12 * np.trace(full[: self._n, : self._n])
         self._full = 0.5 * (full + full.T)
         self._inverse = _inverse(self._full)
-        self._pattern = np.ones(self.markers.n_markers, dtype=bool)
-        self._pattern_inverse = self._inverse
+        self._whole = self._problem(np.ones(self.markers.n_markers, dtype=bool))
+        self._pattern, self._pushed = np.ones(self.markers.n_markers, dtype=bool), self._whole
         self._last: np.ndarray | None = None
 
-    def energy(self, weights: np.ndarray, displacements: np.ndarray) -> np.ndarray:
-        """(F,) energy of (F, N) weights for (F, P, 3) displacements: what `solve` minimises."""
+    def energy(self, weights: np.ndarray, displacements: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
+        """(F,) energy of (F, N) weights for (F, P, 3) displacements: what `solve` minimises.
+
+        With `release` there are two: the first solve's, and, given the (F, N) weights `first` at its optimum (those of
+        a solver without release), the second's.
+        """
         rows, present = self.markers.checked(displacements)
         error = (weights @ self.markers.matrix.T - rows) / np.sqrt(self.markers.scale)
         own = weights[:, self.markers.observed]
@@ -150,7 +161,10 @@ class ThinShellSolver:
             left = wanted - stacked @ np.linalg.lstsq(stacked, wanted, rcond=None)[0]
             data[frames] = (left**2).sum(axis=0)
         shell = np.einsum("fi,ij,fj->f", own, self.shell, own)
-        return data + shell + self.holding * holding_energy(own, self.sparsity).sum(axis=1)
+        held = holding_energy(own, self.sparsity)
+        if first is not None:
+            held -= self.sparsity * released(first[:, self.markers.observed]) * own
+        return data + shell + self.holding * held.sum(axis=1)
 
     def solve(self, displacements: np.ndarray) -> Solution:
         """Weights of each frame at the optimum of the energy.
@@ -174,20 +188,29 @@ class ThinShellSolver:
         )
 
     def _solve_chunk(self, displacements: np.ndarray) -> Solution:
-        rows, present = self.markers.checked(displacements)
-        weights = np.zeros((len(rows), len(self.names)))
-        right = rows @ (self._columns / np.sqrt(self.markers.scale))  # a missing marker's row is 0
-        for pattern, frames in presence_patterns(present):
-            inverse = self._inverse_for(pattern)
-            weights[np.ix_(frames, self.markers.observed)] = minimise(
-                right[frames] @ inverse[:, : self._n],
-                inverse[: self._n, : self._n],
-                bounds=self.holding,
-                sparsity=self.sparsity,
-                tolerance=GRADIENT,
-                threads=self.threads,
-            )
-        return self.markers.solution(weights, rows, present)
+        rows = self.markers.rows(displacements)
+        weights, residual = self._minimise(rows, self._whole)
+        left = np.flatnonzero(np.isnan(residual))
+        if len(left):
+            some, present = self.markers.checked(displacements[left])
+            weights[left] = np.nan
+            for pattern, frames in presence_patterns(present):
+                weights[left[frames]], residual[left[frames]] = self._minimise(some[frames], self._problem(pattern))
+        return Solution(weights, residual)
+
+    def _minimise(
+        self, rows: np.ndarray, problem: Problem, first: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        return minimise(
+            rows,
+            problem,
+            bounds=self.holding,
+            sparsity=self.sparsity,
+            tolerance=GRADIENT,
+            release=self.release,
+            first=first,
+            threads=self.threads,
+        )
 
     def push(self, frame: np.ndarray) -> Solution:
         """Weights of one frame of a live capture, started from the frame pushed before it.
@@ -203,22 +226,13 @@ class ThinShellSolver:
             Of one frame; the same weights as `solve` gives.
         """
         rows, present = self.markers.checked(np.asarray(frame, dtype=np.float64)[None])
-        weights = np.zeros((1, len(self.names)))
-        if present.any():
-            if (present[0] != self._pattern).any():
-                self._pattern, self._pattern_inverse = present[0], self._inverse_for(present[0])
-            right = rows @ self._columns / np.sqrt(self.markers.scale)
-            self._last = minimise(
-                right @ self._pattern_inverse[:, : self._n],
-                self._pattern_inverse[: self._n, : self._n],
-                bounds=self.holding,
-                sparsity=self.sparsity,
-                tolerance=GRADIENT,
-                first=None if self._last is None else self._last[0],
-                threads=1,
-            )
-            weights[:, self.markers.observed] = self._last
-        return self.markers.solution(weights, rows, present)
+        if not present.any():
+            return Solution(np.full((1, len(self.names)), np.nan), np.full(1, np.nan))
+        if (present[0] != self._pattern).any():
+            self._pattern, self._pushed = present[0], self._problem(present[0])
+        weights, residual = self._minimise(rows, self._pushed, self._last)
+        self._last = weights[0, self._whole.places]
+        return Solution(weights, residual)
 
     def uncertainty(self, weights: np.ndarray, marker_error: float) -> np.ndarray:
         """Standard deviation of each weight, from the curvature of the energy at the optimum.
@@ -246,7 +260,7 @@ class ThinShellSolver:
         # D is the squared error over `scale`: a log-likelihood is it times scale / (2 * marker_error^2).
         factor = marker_error / np.sqrt(self.markers.scale)
         diagonal = np.arange(own.shape[1])
-        normal = np.linalg.inv(self._inverse[: self._n, : self._n])
+        normal = self._whole.normal
         for start in range(0, len(own), 1024):
             hessian = np.broadcast_to(normal, (len(own[start : start + 1024]), *normal.shape)).copy()
             hessian[:, diagonal, diagonal] += 0.5 * held[start : start + 1024]
@@ -254,20 +268,34 @@ class ThinShellSolver:
             result[start : start + 1024, observed] = factor * np.sqrt(np.maximum(variance, 0.0))
         return result
 
-    def _inverse_for(self, pattern: np.ndarray) -> np.ndarray:
-        """The inverse of the quadratic form when only some markers are there, by a low-rank update of the full one.
+    def _problem(self, pattern: np.ndarray) -> Problem:
+        """The quadratic form when only the markers of `pattern` are there, the head's motions eliminated.
 
-        Taking k rows `a` out of `A = sum a' a + shell` gives `V + V a' (I - a V a')^-1 a V` with `V = A^-1`
-        (Woodbury); past a third as many rows as bases it is cheaper to invert anew.
+        The inverse is that of all markers, updated. Taking k rows `a` out of `A = sum a' a + shell` gives
+        `V + V a' (I - a V a')^-1 a V` with `V = A^-1` (Woodbury); past a third as many rows as bases it is cheaper to
+        invert anew.
         """
-        if pattern.all():
-            return self._inverse
+        full, inverse = self._full, self._inverse
         gone = self._columns[np.repeat(~pattern, 3)]
-        if 3 * len(gone) > len(self._inverse):
-            return _inverse(self._full - gone.T @ gone)
-        across = self._inverse @ gone.T
-        inner = np.eye(len(gone)) - gone @ across
-        return self._inverse + across @ np.linalg.solve(inner, across.T)
+        if len(gone):
+            full = full - gone.T @ gone
+            if 3 * len(gone) > len(full):
+                inverse = _inverse(full)
+            else:
+                across = inverse @ gone.T
+                inverse = inverse + across @ np.linalg.solve(np.eye(len(gone)) - gone @ across, across.T)
+        n, observed = self._n, self.markers.observed
+        # Weights c leave the head's best motions h at h = F_hh^-1 (J' row - F_hc c).
+        motions = np.linalg.solve(full[n:, n:], full[n:, :n])
+        return Problem(
+            full[:n, :n] - full[:n, n:] @ motions,
+            inverse[:n, :n],
+            (self._columns[:, :n] - self._columns[:, n:] @ motions).T / np.sqrt(self.markers.scale),
+            self.markers.matrix[:, observed] * np.repeat(pattern, 3)[:, None],
+            count=int(pattern.sum()),
+            places=np.flatnonzero(observed),
+            width=len(self.names),
+        )
 
 
 def _rigid_motions(points: np.ndarray) -> np.ndarray:
