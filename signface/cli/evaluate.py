@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import argparse
-import csv
-import json
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from signface.cli.options import add_face_arguments
 from signface.cli.progress import progress
 from signface.cli.train import add_training_arguments, training_options, words
 from signface.errors import SignfaceError
 from signface.label.labellers import NAMES, SEQUENCE_NAMES
+
+if TYPE_CHECKING:
+    from signface.label.examples import Example
+    from signface.segment.segments import Segments
 
 EXAMPLE = """  signface evaluate corpora/feel -o reports/feel
   signface evaluate corpora/feel -o reports/feel --train-kinds IE,SE,EU --protocol across --classifiers net-hsmm"""
@@ -37,7 +39,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Fill the parser of this command."""
     parser.add_argument("corpus", type=Path, metavar="CORPUS", help="folder of a corpus")
     parser.add_argument(
-        "-o", "--output", type=Path, required=True, metavar="FOLDER", help="for report.html, metrics.json, confusions"
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="FOLDER",
+        help="for report.html, metrics.json, tables as CSV, figures as SVG and PDF",
     )
     parser.add_argument(
         "--train-kinds", type=words, default=["IE", "SE"], metavar="IE,SE", help="kinds trained on (default: IE,SE)"
@@ -60,6 +67,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--calibrate", action="store_true", help="calibrate confidences, by folds of the training takes"
     )
+    parser.add_argument(
+        "--learning-curve",
+        action="store_true",
+        help="draw learning curves of all classifiers, not only of those of the thesis (sequence models: minutes)",
+    )
+    parser.add_argument(
+        "--date", metavar="WORDS", help="date to print on the report (default: none, so that its bytes repeat)"
+    )
     parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")
     add_face_arguments(parser)
 
@@ -67,7 +82,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Solve, train, compare, write and print."""
     from signface.corpus.examples import solve_examples
+    from signface.corpus.facts import corpus_facts
     from signface.corpus.manifest import read_corpus
+    from signface.face.reading import read_face
+    from signface.report.evaluation_report import Evaluated, write_report
 
     unknown = [name for name in arguments.classifiers if name not in NAMES | SEQUENCE_NAMES]
     if unknown or not arguments.classifiers:
@@ -89,7 +107,7 @@ def run(arguments: argparse.Namespace) -> None:
         layout=arguments.layout,
         progress=lambda items: progress(items, "solving", total=sum(t.annotation is not None for t in corpus)),
     )
-    metrics = measure(
+    metrics, found = measure(
         examples,
         protocols,
         arguments.train_kinds,
@@ -97,14 +115,18 @@ def run(arguments: argparse.Namespace) -> None:
         arguments.seed,
         classifiers=arguments.classifiers,
         training=training,
+        curves_of=arguments.classifiers if arguments.learning_curve else None,
     )
-    write_results(metrics, arguments.output, corpus=whole.folder.resolve().name)
+    facts = corpus_facts(corpus, face=arguments.face, layout=arguments.layout)
+    metrics["corpus"] = facts
+    face = read_face(arguments.face) if facts["faces"] else None
+    page = write_report(Evaluated(metrics, facts, examples, found, face, arguments.date), arguments.output)
     print_results(metrics)
-    print(f"report: {arguments.output / 'report.html'}")
+    print(f"report: {page}")
 
 
 def measure(
-    examples: list,
+    examples: list[Example],
     protocols: list[str],
     train_kinds: list[str],
     test_kinds: list[str],
@@ -112,22 +134,26 @@ def measure(
     *,
     classifiers: Sequence[str] = tuple(NAMES),
     training: Mapping[str, Any] | None = None,
-) -> dict:
-    """The content of metrics.json.
+    curves_of: Sequence[str] | None = None,
+) -> tuple[dict, dict[str, dict[str, dict[str, Segments]]]]:
+    """The content of metrics.json, and what was found by protocol, classifier and take.
 
     `classifiers` holds the first protocol; a second one stands under `also`, by its name.
     """
+    from signface.evaluate.details import details
     from signface.evaluate.protocol import evaluate, folds_of
     from signface.segment.segmentation import segment
 
-    segments = {e.take: segment(e.descriptors) for e in examples if e.kind in test_kinds}
+    segments = {e.take: segment(e.descriptors) for e in examples}
     metrics: dict = {}
+    evaluations, all_folds = {}, {}
     for protocol in protocols:
         folds = folds_of(examples, protocol=protocol, train_kinds=train_kinds, test_kinds=test_kinds)
         shown = partial(progress, what=f"evaluating {protocol}")
         found = evaluate(
             folds, classifiers=classifiers, seed=seed, segments=segments, training=training, progress=shown
         )
+        evaluations[protocol], all_folds[protocol] = found, folds
         description = {
             "name": protocol,
             "train_kinds": train_kinds,
@@ -152,53 +178,26 @@ def measure(
                 **{key: value for key, value in found.metrics.items() if key != "segmentation"},
                 "protocol": description,
             }
-    return metrics
-
-
-def by_protocol(metrics: dict) -> dict[str, dict]:
-    """Protocol to its classifiers, from the content of metrics.json."""
-    others = {name: part["classifiers"] for name, part in metrics.get("also", {}).items()}
-    return {metrics["protocol"]["name"]: metrics["classifiers"], **others}
-
-
-def write_results(metrics: dict, folder: Path, *, corpus: str) -> None:
-    """Write metrics.json, report.html and a table of confusions for each protocol and classifier."""
-    from importlib.metadata import version
-
-    from signface.files import whole_file
-    from signface.report.evaluation import evaluation_page
-
-    protocols = by_protocol(metrics)
-    with whole_file(folder / "metrics.json") as temporary:
-        temporary.write_text(json.dumps(metrics, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    for protocol, classifiers in protocols.items():
-        for name, sections in classifiers.items():
-            file = folder / f"confusion_{protocol}_{name}.csv"
-            with whole_file(file) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
-                writer = csv.writer(stream, lineterminator="\n")
-                writer.writerow(["on", "reference", *sections["frames"]["labels"]])
-                for section, scores in sections.items():
-                    rows = zip(scores["labels"], scores["confusion"], strict=True)
-                    writer.writerows([section, label, *counts] for label, counts in rows)
-    folds = metrics["protocol"]["folds"]
-    settings = {
-        "trained on": ", ".join(metrics["protocol"]["train_kinds"]),
-        "tested on": ", ".join(metrics["protocol"]["test_kinds"]),
-        "signers tested": ", ".join(dict.fromkeys(fold["signer"] for fold in folds)),
-        "takes tested": str(sum(len(fold["test_takes"]) for fold in folds)),
-        "seed": str(metrics["protocol"]["seed"]),
-        "signface": version("signface"),
-    }
-    page = evaluation_page(corpus=corpus, segmentation=metrics["segmentation"], protocols=protocols, settings=settings)
-    with whole_file(folder / "report.html") as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    metrics |= details(
+        evaluations,
+        all_folds,
+        examples,
+        segments,
+        curves_of=curves_of,
+        training=training,
+        seed=seed,
+        progress=lambda steps, what: progress(steps, what),
+    )
+    return metrics, {protocol: found.found for protocol, found in evaluations.items()}
 
 
 def print_results(metrics: dict) -> None:
     """Print accuracies beside chance and the majority class, and how the segments agree."""
-    from signface.report.evaluation import PROTOCOL_TITLES, SECTIONS, number
+    from signface.report.evaluation_tables import PROTOCOL_TITLES, SECTIONS, by_protocol
+    from signface.report.page_tables import spelt as number
 
-    for protocol, classifiers in by_protocol(metrics).items():
+    for protocol, part in by_protocol(metrics).items():
+        classifiers = part["classifiers"]
         sections = next(iter(classifiers.values()))
         rows = [["accuracy, " + PROTOCOL_TITLES[protocol], *SECTIONS.values()]]
         rows += [[name, *(number(scores[key]["accuracy"]) for key in SECTIONS)] for name, scores in classifiers.items()]

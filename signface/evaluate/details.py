@@ -14,12 +14,13 @@ from typing import Any
 import pandas as pd
 
 from signface.evaluate.importance import can_be_judged, permutation_importance
-from signface.evaluate.learning_curve import learning_curve
+from signface.evaluate.learning_curve import learning_curve, remembering
 from signface.evaluate.protocol import Evaluation, Fold
 from signface.evaluate.segmentation import segmentation_metrics
+from signface.label.examples import Example
 from signface.label.labellers import NAMES
 from signface.label.model import TrainedModel
-from signface.label.training import Example
+from signface.label.training import train_model
 from signface.segment.segments import Segments
 
 #: How the segmentation that learns nothing is called among the methods (thesis, 4.4.2).
@@ -72,8 +73,8 @@ def details(
     segments: Mapping[str, Segments],
     *,
     curves_of: Sequence[str] | None = None,
+    training: Mapping[str, Any] | None = None,
     seed: int = 0,
-    train: Callable[..., TrainedModel],
     progress: Callable[[Iterable, str], Iterable] = lambda items, what: items,
 ) -> dict[str, Any]:
     """Segmentation by kind, learning curves, the importance of bases and reliability, as plain values.
@@ -87,9 +88,10 @@ def details(
         What the energies find.
     curves_of : sequence of str, optional
         Classifiers with a learning curve; those of the thesis by default, since sequence models train for minutes.
+    training : mapping, optional
+        What was evaluated (`signface.evaluate.protocol.evaluate`). Nothing is searched again: importance is asked of
+        the parameters that were chosen, learning curves are drawn with the classifiers' own.
     seed : int
-    train : callable
-        As for `learning_curve`; it trains what was evaluated.
     progress : callable, optional
         Wraps the steps of each protocol's curve, with words for what is done.
 
@@ -101,6 +103,13 @@ def details(
         - `importance`: classifier to a list of groups of bases, for the main protocol;
         - `reliability`: protocol and classifier to share right by confidence.
     """
+    told = dict(training or {}, search=False, calibrate=False)
+    train = remembering()
+
+    def trained(takes: Sequence[Example], *, classifier: str, **options: Any) -> TrainedModel:
+        own = {key: value for key, value in told.items() if key != "features" or classifier in NAMES}
+        return train(takes, classifier=classifier, **own, **options)
+
     found = {protocol: evaluation.found for protocol, evaluation in evaluations.items()}
     result: dict[str, Any] = {"segmentation_by_kind": segmentation_by_kind(examples, segments, found)}
     curves: dict[str, list] = {}
@@ -108,22 +117,27 @@ def details(
     for protocol, evaluation in evaluations.items():
         scores = evaluation.metrics["classifiers"]
         drawn = [name for name in scores if (name in NAMES if curves_of is None else name in curves_of)]
+        searched = (training or {}).get("search", False)
         if drawn:
             signers = max(len({example.signer for example in fold.train}) for fold in folds[protocol])
             curve = learning_curve(
                 folds[protocol],
                 classifiers=drawn,
                 by="signers" if signers > 1 else "takes",
-                whole={name: scores[name]["manual_segments"]["accuracy"] for name in drawn},
+                whole={} if searched else {name: scores[name]["manual_segments"]["accuracy"] for name in drawn},
                 seed=seed,
-                train=train,
+                train=trained,
                 progress=lambda steps, protocol=protocol: progress(steps, f"learning curve {protocol}"),  # type: ignore[misc]
             )
             curves[protocol] = _records(curve)
         if importance or protocol != next(iter(evaluations)):
             continue
         for name in [name for name in scores if name in NAMES]:
-            models = [train(fold.train, classifier=name, seed=seed, name=name) for fold in folds[protocol]]
+            chosen = [own[name]["parameters"] for own in evaluation.trained]
+            models = [
+                train_model(fold.train, classifier=name, seed=seed, parameters=own, name=name, **told)
+                for fold, own in zip(folds[protocol], chosen, strict=True)
+            ]
             if all(map(can_be_judged, models)):
                 importance[name] = _records(permutation_importance(folds[protocol], models, seed=seed))
     reliable = {protocol: reliability(evaluation.tables) for protocol, evaluation in evaluations.items()}

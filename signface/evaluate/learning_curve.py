@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from joblib import Parallel, delayed
+from sklearn.utils.parallel import Parallel, delayed
 
 from signface.errors import SignfaceError
 from signface.evaluate.importance import can_be_judged
+from signface.label.examples import Example
 from signface.label.labelling import label_spans, segment_means
 from signface.label.model import TrainedModel
-from signface.label.training import Example, train_model
+from signface.label.training import train_model
 from signface.label.variants import signer_level
 
 if TYPE_CHECKING:
@@ -173,7 +174,7 @@ def remembering(train: Callable[..., TrainedModel] = train_model) -> Callable[..
     trained: dict[tuple, TrainedModel] = {}
 
     def remembered(examples: Sequence[Example], **options: Any) -> TrainedModel:
-        key = (frozenset(example.take for example in examples), *sorted(options.items()))
+        key = (frozenset(example.take for example in examples), repr(sorted(options.items())))
         if key not in trained:
             trained[key] = train(examples, **options)
         return trained[key]

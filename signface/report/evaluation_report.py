@@ -140,7 +140,7 @@ def write_report(evaluated: Evaluated, folder: Path) -> Path:
         temporary.write_text(text, encoding="utf-8")
     drawn = draw_all(evaluated)
     for figure in [figure for own in drawn.values() for figure in own]:
-        save_vector(figure.figure, folder / "figures", figure.name)
+        save_vector(figure.figure, figure.svg, folder / "figures", figure.name)
     for name, table in files(evaluated).items():
         with whole_file(folder / f"{name}.csv") as temporary:
             table.to_csv(temporary, index=False, lineterminator="\n")
@@ -224,6 +224,7 @@ def draw_all(evaluated: Evaluated) -> dict[str, list[Drawn]]:
             )
         ],
         "confusions": [],
+        "confidence": [],
         "curve": [],
         "importance": [],
     }
@@ -241,6 +242,17 @@ def draw_all(evaluated: Evaluated) -> dict[str, list[Drawn]]:
                     "classifier and its accuracy.",
                 )
             )
+    curves = {name: bins for name, bins in metrics["reliability"].get(main, {}).items() if bins}
+    if curves:
+        drawn["confidence"].append(
+            Drawn(
+                "reliability",
+                figures.draw_reliability(curves),
+                "Lines: share of automatic segments that are right, against the confidence of the classifier.",
+                f"Share of automatic segments that are right against their confidence, {tables.PROTOCOL_TITLES[main]}. "
+                "On the dashed line a confidence means what it says; below it, it promises too much.",
+            )
+        )
     points = [pd.DataFrame(own).assign(protocol=protocol) for protocol, own in metrics["learning_curve"].items() if own]
     if points:
         drawn["curve"].append(

@@ -13,6 +13,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from signface.files import whole_file
 from signface.report.timeline import save_figure
 
 if TYPE_CHECKING:
@@ -67,6 +68,7 @@ def svg_element(figure: Figure, name: str, description: str) -> str:
     stream = io.StringIO()
     with styled():
         figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+        figure.set_layout_engine("none")  # what is laid out stays as it is, and is not laid out again
     text = stream.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.S)
@@ -77,8 +79,18 @@ def svg_element(figure: Figure, name: str, description: str) -> str:
     return text.replace("<svg ", f'<svg role="img" aria-label="{label}" ', 1)
 
 
-def save_vector(figure: Figure, folder: Path, name: str) -> None:
-    """Write `name.svg` and `name.pdf` into a folder."""
+def save_vector(figure: Figure, svg: str, folder: Path, name: str) -> None:
+    """Write `name.svg` and `name.pdf` into a folder.
+
+    Parameters
+    ----------
+    figure : Figure
+    svg : str
+        What `svg_element` made of it: a figure is laid out and drawn once.
+    folder : Path
+    name : str
+    """
+    with whole_file(folder / f"{name}.svg") as temporary:
+        temporary.write_text(f'<?xml version="1.0" encoding="utf-8"?>\n{svg}', encoding="utf-8")
     with styled():
-        for suffix in ("svg", "pdf"):
-            save_figure(figure, folder / f"{name}.{suffix}")
+        save_figure(figure, folder / f"{name}.pdf")

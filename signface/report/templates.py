@@ -10,16 +10,9 @@ if TYPE_CHECKING:
 
 
 def environment() -> Environment:
-    """Jinja's environment: everything is escaped, a name that is not given is an error.
+    """Jinja's environment: everything is escaped, a name that is not given is an error."""
+    import jinja2
 
-    Raises
-    ------
-    SignfaceError
-        Jinja is not installed.
-    """
-    from signface.study.extras import needed
-
-    jinja2 = needed("jinja2")
     return jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,
