@@ -63,6 +63,10 @@ class FrameFeatures:
         count = max(1, round(descriptors.duration * self.rate))
         return descriptors.start + (np.arange(count) + 0.5) * descriptors.duration / count
 
+    def width(self, bases: int) -> int:
+        """How many features `of` gives for so many bases; they stand window by window, each with all bases."""
+        return bases * (len(self.edges) - 1 + 2 * self.changes + self.unsteadiness)
+
     def of(self, descriptors: Descriptors, bases: Sequence[str]) -> np.ndarray:
         """(K, features) features of the frames of a take.
 

@@ -10,7 +10,7 @@ long (Rabiner 1989, section IV.D; Murphy 2002, Hidden semi-Markov models).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,29 +95,66 @@ class SegmentModel:
         Each border moves by at most `SETTLING_S`, and keeps two frames to the next transition and at least one of the
         transition found.
         """
-        reach = round(SETTLING_S * self.rate)
         total = np.concatenate([[0.0], np.cumsum(odds)])
-        settled = [list(segment) for segment in course]
-        for before, moving, after in zip(settled[:-2:2], settled[1::2], settled[2::2]):
-            start, end = moving[:2]
-            starts = np.arange(min(max(before[0] + 2, start - reach), start), end)
-            ends = np.arange(start + 1, max(min(after[1] - 2, end + reach), end) + 1)
-            length = ends[None, :] - starts[:, None]
-            known = self.transition[length.clip(1, len(self.transition) - 1)]
-            score = np.where(length >= 2, total[ends][None, :] - total[starts][:, None] + known, -np.inf)
-            if np.isfinite(score).any():
-                first, last = np.unravel_index(int(score.argmax()), score.shape)
-                moving[0], moving[1] = int(starts[first]), int(ends[last])
-                before[1], after[0] = moving[0], moving[1]
-        return [(first, last, code) for first, last, code in settled]
 
-    def decode(self, evidence: np.ndarray) -> list[tuple[int, int, int]]:
+        def score(start: int, last_start: int, first_end: int, end: int) -> np.ndarray:
+            return total[first_end : end + 1][None, :] - total[start:last_start][:, None]
+
+        return self._moved(course, score, 1.0)
+
+    def _moved(
+        self, course: list[tuple[int, int, int]], score: Callable[[int, int, int, int], np.ndarray], weight: float
+    ) -> list[tuple[int, int, int]]:
+        """The course with the borders of each transition where `score` and its duration together are highest.
+
+        `score` is given the first beginning and the frame after the last, the first end and the last.
+        """
+        reach = round(SETTLING_S * self.rate)
+        moved = [list(segment) for segment in course]
+        for before, moving, after in zip(moved[:-2:2], moved[1::2], moved[2::2]):
+            start, end = moving[:2]
+            earliest = min(max(before[0] + 2, start - reach), start)
+            latest = max(min(after[1] - 2, end + reach), end)
+            length = np.arange(start + 1, latest + 1)[None, :] - np.arange(earliest, end)[:, None]
+            known = self.transition[length.clip(1, len(self.transition) - 1)]
+            scores = np.where(length >= 2, score(earliest, end, start + 1, latest) + weight * known, -np.inf)
+            if np.isfinite(scores).any():
+                first, last = np.unravel_index(int(scores.argmax()), scores.shape)
+                moving[0], moving[1] = earliest + int(first), start + 1 + int(last)
+                before[1], after[0] = moving[0], moving[1]
+        return [(first, last, code) for first, last, code in moved]
+
+    def place(
+        self, course: list[tuple[int, int, int]], likely: np.ndarray, *, duration_weight: float = 1.0
+    ) -> list[tuple[int, int, int]]:
+        """The same course with each border where it most likely is.
+
+        Each border moves within the limits of `settle`.
+
+        Parameters
+        ----------
+        course : list of (int, int, int)
+            As `decode` returns it.
+        likely : (K + 1, 2) array
+            Log probability, up to a constant, that a transition begins, and that one ends, before each frame.
+        duration_weight : float
+            Weight of the log probability of the transition's duration.
+        """
+
+        def score(start: int, last_start: int, first_end: int, end: int) -> np.ndarray:
+            return likely[start:last_start, 0][:, None] + likely[first_end : end + 1, 1][None, :]
+
+        return self._moved(course, score, duration_weight)
+
+    def decode(self, evidence: np.ndarray, borders: np.ndarray | None = None) -> list[tuple[int, int, int]]:
         """The course with the highest score.
 
         Parameters
         ----------
         evidence : (K, A + 1) array
             Log likelihood (up to a constant in each frame) of each label, and of a transition in the last column.
+        borders : (K + 1, 2) array, optional
+            What is scored further for a transition that begins, and that ends, before each frame.
 
         Returns
         -------
@@ -126,6 +163,7 @@ class SegmentModel:
             and the last are stable; how long they were before and after the take is unknown and costs nothing.
         """
         frames, held = len(evidence), len(self.labels)
+        begins, ends = np.zeros((2, frames + 1)) if borders is None else borders.T
         total = np.concatenate([np.zeros((1, held + 1)), np.cumsum(evidence, axis=0)])
         label_total, moving_total = total[:, :held], total[:, held]
         longest, widest = len(self.stable) - 1, len(self.transition) - 1
@@ -159,12 +197,13 @@ class SegmentModel:
             left[k], began[k] = best + label_total[k], at
             first = max(k - widest, 1)
             if first < k and not last:
-                score = left[first:k] + (self.transition[k - first : 0 : -1] - moving_total[first:k])[:, None]
+                lasting = self.transition[k - first : 0 : -1] - moving_total[first:k] + begins[first:k]
+                score = left[first:k] + lasting[:, None]
                 leave = score.argmax(axis=0)
                 change = score[leave, every][:, None] + self.after
                 source[k] = change.argmax(axis=0)
                 moved[k] = leave[source[k]] + first
-                entered[k] = change.max(axis=0) + moving_total[k] - label_total[k]
+                entered[k] = change.max(axis=0) + moving_total[k] - label_total[k] + ends[k]
         course, end, label = [], frames, int(left[frames].argmax())
         while True:
             begin = int(began[end, label])

@@ -11,34 +11,28 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import pandas as pd
-from sklearn.base import BaseEstimator, clone
+from sklearn.base import clone
 from sklearn.exceptions import ConvergenceWarning
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.label.border_features import border_features
-from signface.label.frame_features import TRANSITION, FrameFeatures, frame_states
 from signface.label.labellers import SEQUENCE_NAMES
 from signface.label.semi_markov import SegmentModel
-from signface.label.vocabulary import join
+from signface.label.take_labeller import HALVES, LEAST, TakeLabeller, log_odds, shares
 from signface.segment.segments import Segments
 
-#: The two halves of a transition, which a frame classifier tells apart better than one state that begins as one
-#: expression and ends as another.
-HALVES = ("leaving", "arriving")
 
-#: Share of a probability that no frame classifier is trusted to tell from zero.
-LEAST = 1e-3
-
-
-def make_sequence_labeller(name: str, *, seed: int = 0) -> SequenceLabeller:
+def make_sequence_labeller(name: str, *, seed: int = 0) -> TakeLabeller:
     """A new sequence model, which scikit-learn can clone and search over.
 
     - `net-hsmm`: three networks with one hidden layer, averaged, and gradient-boosted trees for the borders; segments
       last as long as they do in the annotations.
     - `forest-viterbi`: 60 trees; the duration of a segment is geometric, as in every plain hidden Markov model.
     - `hmm`: each state is a Gaussian (one covariance for all), and durations are geometric.
+    - `crf`: scores linear in what lies around a frame, learnt for whole courses (`signface.label.crf`).
+    - `gru`: a recurrent network sees the take forwards and backwards (`signface.label.gru`); it trains by PyTorch, the
+      extra `deep`, and annotates without it.
 
     Parameters
     ----------
@@ -69,6 +63,14 @@ def make_sequence_labeller(name: str, *, seed: int = 0) -> SequenceLabeller:
             60, min_samples_leaf=5, max_depth=14, max_features=0.03, class_weight="balanced", random_state=seed
         )
         return SequenceLabeller(forest, durations="geometric")
+    if name == "crf":
+        from signface.label.crf import ChainLabeller
+
+        return ChainLabeller()
+    if name == "gru":
+        from signface.label.gru import RecurrentLabeller
+
+        return RecurrentLabeller(seed=seed)
     if name == "hmm":
         from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 
@@ -77,7 +79,7 @@ def make_sequence_labeller(name: str, *, seed: int = 0) -> SequenceLabeller:
     raise SignfaceError(f"there is no sequence model named {name}", hint=f"choose one of {', '.join(SEQUENCE_NAMES)}")
 
 
-class SequenceLabeller(BaseEstimator):
+class SequenceLabeller(TakeLabeller):
     """Borders and labels of takes, learnt from annotated takes.
 
     A frame classifier gives each frame (25 a second) the probability of each label and of the two halves of a
@@ -150,24 +152,9 @@ class SequenceLabeller(BaseEstimator):
         """
         if self.durations not in ("counted", "geometric"):
             raise SignfaceError(f"durations are counted or geometric, not {self.durations}")
-        self.bases_ = tuple(takes[0].names)
-        self.n_features_in_ = len(self.bases_)
-        held = {str(label) for reference in references for label in reference.table.query("kind == 'stable'")["label"]}
-        self.classes_ = np.array(sorted(held))
-        states = [_halved(frame_states(r, self._frames.times(d))) for d, r in zip(takes, references, strict=True)]
+        states = self.states_of(takes, references)
         known = [state != "" for state in states]
         state = np.concatenate([state[k] for state, k in zip(states, known, strict=True)])
-        if len(self.classes_) < 2 or not set(HALVES) <= set(state):
-            raise SignfaceError(
-                "a sequence model needs two expressions or more and the transitions between them",
-                hint="train on more takes, or look at their annotations",
-            )
-        missing = sorted(set(self.classes_) - set(state))
-        if missing:
-            raise SignfaceError(
-                f"the training takes hold too little of {', '.join(missing)}",
-                hint="train on more takes of it, or on takes without it",
-            )
         borders = [border_features(take, self._frames.times(take)) for take in takes]
         gathered = np.concatenate(borders)
         self.border_mean_, self.border_scale_ = gathered.mean(axis=0), gathered.std(axis=0) + 1e-9
@@ -198,87 +185,24 @@ class SequenceLabeller(BaseEstimator):
         held = len(self.classes_)
         return np.concatenate([found[:, :held], found[:, held:].sum(axis=1, keepdims=True)], axis=1)
 
-    def label_probabilities(self, take: Descriptors) -> np.ndarray:
-        """(K, A) probability of each of `classes_` at each frame, if it is no transition."""
-        return _shares(self.frame_probabilities(take)[:, : len(self.classes_)])
-
-    def frame_times(self, take: Descriptors) -> np.ndarray:
-        """(K,) times at which the frames of a take are judged, seconds."""
-        return self._frames.times(take)
-
-    def annotate(self, take: Descriptors) -> Segments:
-        """The segments of a take with `label` and `confidence`.
-
-        The confidence of a stable segment is the mean probability of its label among the labels over its frames, that
-        of a transition the product of its neighbours'.
-        """
+    def find(self, take: Descriptors) -> tuple[np.ndarray, list[tuple[int, int, int]]]:
+        """See `TakeLabeller`."""
         probability = self.frame_probabilities(take)
         held = len(self.classes_)
-        among = _shares(probability[:, :held])
-        odds = _log_odds(probability[:, held])
+        among = shares(probability[:, :held])
+        odds = log_odds(probability[:, held])
         if self.borders_ is not None:
             stable = list(self.borders_.classes_).index("stable")
             still = self.borders_.predict_proba(border_features(take, self.frame_times(take)))[:, stable]
-            odds = (odds + _log_odds(1 - still)) / 2
-        likely = odds - self.rarity * _log_odds(self.shares_[held:].sum())
+            odds = (odds + log_odds(1 - still)) / 2
+        likely = odds - self.rarity * log_odds(self.shares_[held:].sum())
         label = np.log(among.clip(LEAST)) - 0.5 * np.log(self.shares_[:held] / self.shares_[:held].sum())
         label -= label.max(axis=1, keepdims=True)
         model = SegmentModel(tuple(self.classes_), self._frames.rate, self.stable_, self.transition_, self.after_)
         course = model.decode(np.column_stack([self.label_weight * label, self.border_weight * likely]))
-        course = model.settle(course, self.border_weight * odds)
-        step = take.duration / len(probability)
-        kept = [(first, last, code, float(among[first:last, code].mean())) for first, last, code in course[::2]]
-        rows: list[tuple[float, float, str, str, float]] = []
-        for number, (first, last, code, sure) in enumerate(kept):
-            if number:
-                _, before, from_code, from_sure = kept[number - 1]
-                name = join(self.classes_[from_code], self.classes_[code])
-                rows.append((before, first, "transition", name, from_sure * sure))
-            rows.append((first, last, "stable", str(self.classes_[code]), sure))
-        table = pd.DataFrame(rows, columns=["start_s", "end_s", "kind", "label", "confidence"])
-        table[["start_s", "end_s"]] = take.start + table[["start_s", "end_s"]] * step
-        return Segments(table, name=take.name, history=take.history)
-
-    def predict(self, takes: Sequence[Descriptors]) -> list[Segments]:
-        """The segments of each take; see `annotate`."""
-        return [self.annotate(take) for take in takes]
-
-    def score(self, takes: Sequence[Descriptors], references: Sequence[Segments]) -> float:
-        """Share of frames that get the reference's label, all transitions counted as one label."""
-        right = total = 0
-        for found, reference, take in zip(self.predict(takes), references, takes, strict=True):
-            times = self.frame_times(take)
-            truth, said = frame_states(reference, times), frame_states(found, times)
-            right += int((truth == said)[truth != ""].sum())
-            total += int((truth != "").sum())
-        return right / total if total else float("nan")
-
-    @property
-    def _frames(self) -> FrameFeatures:
-        return FrameFeatures(relative=self.relative)
+        return among, model.settle(course, self.border_weight * odds)
 
     def _features(self, take: Descriptors) -> np.ndarray:
         """(K, features) of both kinds; the borders' scaled to the size of weights, so that a network weighs them so."""
         borders = (border_features(take, self._frames.times(take)) - self.border_mean_) / self.border_scale_
         return np.concatenate([self._frames.of(take, self.bases_), 0.3 * borders.clip(-4, 4)], axis=1)
-
-
-def _halved(states: np.ndarray) -> np.ndarray:
-    """States with each transition called `HALVES`, the first and the second half of its frames."""
-    halved = states.astype(object)
-    edges = np.flatnonzero(np.diff((states == TRANSITION).astype(np.int8), prepend=0, append=0))
-    for start, end in edges.reshape(-1, 2):
-        middle = (start + end + 1) // 2
-        halved[start:middle], halved[middle:end] = HALVES
-    return halved.astype(str)
-
-
-def _log_odds(probability: np.ndarray | float) -> np.ndarray:
-    """Log odds of probabilities, none of them nearer to 0 or 1 than `LEAST`."""
-    bounded = np.clip(probability, LEAST, 1 - LEAST)
-    return np.log(bounded / (1 - bounded))
-
-
-def _shares(probability: np.ndarray) -> np.ndarray:
-    """Probabilities of the labels, given that it is one of them."""
-    return probability / probability.sum(axis=1, keepdims=True).clip(1e-12)
