@@ -50,12 +50,12 @@ def write_take(
         The `.eaf` to write; not used with `into`.
     descriptors : Descriptors
     segments : Segments
-        Labelled, with confidence.
+        Labelled, with confidence; with `intensity` where the classifier has learnt it, which is then written.
     signer, video, properties, mapping, date, replace :
         As in `export.write_eaf`.
     channels : mapping, optional
-        Thresholds (`signface.label.channels.read_channels`): also write the further channels and the intensity of the
-        affect.
+        Thresholds (`signface.label.channels.read_channels`): also write the further channels, and the intensity of the
+        affect by their rule where the segments have none.
     doubtful_below : float, optional
         Also write the segments whose confidence is below this on a tier of their own.
     template : path, optional
@@ -78,7 +78,7 @@ def write_take(
     tiers = []
     if channels is not None:
         tiers = channel_tiers(find_channels(descriptors, channels), signer)
-        if "intensity" in channels:
+        if "intensity" in channels and "intensity" not in segments.table:
             segments = find_intensities(descriptors, segments, channels)
     if doubtful_below is not None:
         tiers = [doubtful_tier(segments, signer, below=doubtful_below), *tiers]
