@@ -1,6 +1,7 @@
 """The main job as one function: a recording in, labelled segments out, and an ELAN file on request.
 
 - `annotate`: recording to `Annotation` (descriptors, labelled segments, which model).
+- `describe`, `describe_pieces`: its first half, recording to descriptors.
 - `write_annotation`: an `Annotation` to `TAKE.eaf`, with its curves beside it.
 - `summarise`: what was found, in plain words.
 
@@ -9,7 +10,7 @@ The steps themselves live in their rooms; this module only puts them in a row.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from signface.face.layout import MarkerLayout
     from signface.face.model import FaceModel
     from signface.label.model import TrainedModel
-    from signface.takes.take import Take
+    from signface.takes.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class Annotation:
 
 
 def annotate(
-    recording: Take | Descriptors,
+    recording: Recording | Descriptors,
     *,
     model: TrainedModel,
     face: FaceModel | None = None,
@@ -60,8 +61,8 @@ def annotate(
 
     Parameters
     ----------
-    recording : Take or Descriptors
-        What `signface.takes.reading.read_recording` returns; descriptors (weights from a phone) are not solved.
+    recording : Take, TakeFile or Descriptors
+        What `signface.takes.reading.open_recording` returns; descriptors (weights from a phone) are not solved.
     model : TrainedModel
         What `signface.label.persistence.load_model` returns.
     face : FaceModel, optional
@@ -95,27 +96,53 @@ def annotate(
 
 
 def describe(
-    recording: Take | Descriptors,
+    recording: Recording | Descriptors,
     *,
     face: FaceModel | None = None,
     layout: MarkerLayout | None = None,
     neutral: str | float = "auto",
     method: str = "thin-shell",
     alpha: float | None = None,
+    **options: Any,
 ) -> Descriptors:
     """Descriptors of a recording: solved from markers, or passed through when they came from a phone.
 
-    Parameters and errors are those of `annotate`.
+    Parameters and errors are those of `annotate` and, for `options`, of `signface.solve.solving.solve_take`.
     """
     if isinstance(recording, Descriptors):
         return recording
-    from signface.face.layout_files import choose_layout
-    from signface.face.reading import read_face
     from signface.solve.solving import solve_take
 
+    face, layout = _face_and_layout(recording, face, layout)
+    return solve_take(recording, face, layout, neutral=neutral, method=method, alpha=alpha, **options)
+
+
+def describe_pieces(
+    recording: Recording | Descriptors,
+    *,
+    face: FaceModel | None = None,
+    layout: MarkerLayout | None = None,
+    **options: Any,
+) -> Iterator[Descriptors]:
+    """Descriptors of a recording of any length, piece by piece; see `describe` and `solving.solve_pieces`."""
+    if isinstance(recording, Descriptors):
+        yield recording
+        return
+    from signface.solve.solving import solve_pieces
+
+    face, layout = _face_and_layout(recording, face, layout)
+    yield from solve_pieces(recording, face, layout, **options)
+
+
+def _face_and_layout(
+    recording: Recording, face: FaceModel | None, layout: MarkerLayout | None
+) -> tuple[FaceModel, MarkerLayout]:
+    """The face and layout given, or the shipped ones."""
+    from signface.face.layout_files import choose_layout
+    from signface.face.reading import read_face
+
     face = read_face("default") if face is None else face
-    layout = choose_layout(recording.labels, face) if layout is None else layout
-    return solve_take(recording, face, layout, neutral=neutral, method=method, alpha=alpha)
+    return face, choose_layout(recording.labels, face) if layout is None else layout
 
 
 def write_annotation(
@@ -165,7 +192,12 @@ def write_annotation(
 def median_residual(descriptors: Descriptors) -> float | None:
     """Median over the frames of the solve's residual in millimetres; None where there was nothing to solve."""
     assert descriptors.residual is not None
-    known = descriptors.residual[np.isfinite(descriptors.residual)]
+    return median_known(descriptors.residual)
+
+
+def median_known(values: np.ndarray) -> float | None:
+    """Median of the values that are known; None where none is."""
+    known = values[np.isfinite(values)]
     return float(np.median(known)) if known.size else None
 
 

@@ -5,15 +5,19 @@ It stands at the top of the package because the rooms on both sides of it (solve
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from signface.errors import SignfaceError
 from signface.files import whole_file
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -110,10 +114,97 @@ class Descriptors:
 
     def table(self) -> pd.DataFrame:
         """The columns of the weights file: `time_s`, one per base, `residual_mm`."""
+        import pandas as pd
+
         table = pd.DataFrame(self.weights, columns=list(self.names))
         table.insert(0, "time_s", self.time)
         table["residual_mm"] = self.residual
         return table
+
+
+class WeightsWriter:
+    """A weights file written piece by piece: `time_s`, one column per base and `residual_mm`.
+
+    As a context manager it appends to a temporary file, which takes the place of `path` when the block ends well and
+    vanishes when it does not. The bytes depend on the frames, not on how they come in pieces, but for the groups of
+    rows of a .parquet.
+
+    Parameters
+    ----------
+    path : path
+        .csv or .parquet.
+
+    Raises
+    ------
+    SignfaceError
+        The ending is neither, or the folder cannot be written.
+
+    Examples
+    --------
+    >>> with WeightsWriter("weights.csv") as writer:  # doctest: +SKIP
+    ...     for piece in solve_pieces(recording, face, layout):
+    ...         writer.append(piece)
+    """
+
+    def __init__(self, path: str | PathLike[str]) -> None:
+        if Path(path).suffix.lower() not in (".csv", ".parquet"):
+            raise SignfaceError("the ending of a weights file is .csv or .parquet", file=path)
+        self.path, self.frames, self._begun = Path(path), 0, False
+        self._names: tuple[str, ...] = ()
+        self._start = self._rate = 0.0
+        self._open = contextlib.ExitStack()
+
+    def __enter__(self) -> WeightsWriter:
+        self._temporary = self._open.enter_context(whole_file(self.path))
+        return self
+
+    def __exit__(self, kind: Any, error: Any, trace: Any) -> bool | None:
+        if kind is None and not self._begun:
+            error = SignfaceError("there are no weights to write", file=self.path)
+            kind = SignfaceError
+        return self._open.__exit__(kind, error, trace)
+
+    def append(self, piece: Descriptors) -> None:
+        """Write the frames that follow those before.
+
+        Raises
+        ------
+        SignfaceError
+            The piece has other bases than those before.
+        """
+        import pyarrow as pa
+
+        if not self._begun:
+            self._names, self._start, self._rate = piece.names, piece.start, piece.rate
+            self._begin()
+        elif piece.names != self._names:
+            raise SignfaceError("the pieces of a take have different bases", file=self.path)
+        time = self._start + np.arange(self.frames, self.frames + piece.n_frames) / self._rate
+        columns = [time, *piece.weights.T, piece.residual]
+        if self.path.suffix.lower() == ".csv":
+            # A rate is recovered from the times: a microsecond's rounding would show in a take of few frames.
+            columns = [time.round(9), *(column.round(6) for column in columns[1:])]
+        arrays = [pa.array(np.ascontiguousarray(column), from_pandas=True) for column in columns]
+        self._writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
+        self.frames += piece.n_frames
+
+    def _begin(self) -> None:
+        import pyarrow as pa
+
+        self._begun = True
+        names = ["time_s", *self._names, "residual_mm"]
+        self._schema = pa.schema([(name, pa.float64()) for name in names])
+        if self.path.suffix.lower() == ".csv":
+            from pyarrow import csv
+
+            file = self._open.enter_context(self._temporary.open("wb"))
+            file.write((",".join(names) + "\n").encode())  # Arrow would put the names in quotes
+            options = csv.WriteOptions(include_header=False)
+            self._writer: Any = self._open.enter_context(csv.CSVWriter(file, self._schema, write_options=options))
+        else:
+            from pyarrow import parquet
+
+            self._writer = self._open.enter_context(parquet.ParquetWriter(self._temporary, self._schema))
 
 
 def write_weights(descriptors: Descriptors, path: str | PathLike[str]) -> None:
@@ -124,27 +215,8 @@ def write_weights(descriptors: Descriptors, path: str | PathLike[str]) -> None:
     SignfaceError
         The ending is neither, or the folder cannot be written.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in (".csv", ".parquet"):
-        raise SignfaceError("the ending of a weights file is .csv or .parquet", file=path)
-    table = descriptors.table()
-    with whole_file(path) as temporary:
-        if suffix == ".csv":
-            # A rate is recovered from the times: a microsecond's rounding would show in a take of few frames.
-            rounded = table.round(6).assign(time_s=table["time_s"].round(9))
-            _write_csv(rounded, temporary)
-        else:
-            table.to_parquet(temporary, index=False)
-
-
-def _write_csv(table: pd.DataFrame, path: Path) -> None:
-    """Write a table of numbers; by Arrow, which is some ten times as fast as pandas at this."""
-    import pyarrow as pa
-    from pyarrow import csv
-
-    with open(path, "wb") as file:
-        file.write((",".join(table.columns) + "\n").encode())  # Arrow would put the names in quotes
-        csv.write_csv(pa.Table.from_pandas(table, preserve_index=False), file, csv.WriteOptions(include_header=False))
+    with WeightsWriter(path) as writer:
+        writer.append(descriptors)
 
 
 def is_weights_table(columns: list[str]) -> bool:
@@ -162,6 +234,8 @@ def read_weights(path: str | PathLike[str]) -> Descriptors:
     SignfaceError
         The file is missing or is no weights file, has fewer than two rows, or its times do not rise evenly.
     """
+    import pandas as pd
+
     file = Path(path)
     if not file.is_file():
         raise SignfaceError("no such file", file=file)

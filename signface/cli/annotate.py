@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -66,8 +67,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Annotate every take; those that cannot be are named, and the others still are."""
-    from signface.label.persistence import load_model
-
     takes = arguments.takes
     if arguments.video is not None and len(takes) > 1:
         raise SignfaceError("--video belongs to one take", hint="annotate the takes one by one")
@@ -79,20 +78,47 @@ def run(arguments: argparse.Namespace) -> int:
         raise SignfaceError("--into and --template exclude each other", hint="the file of --into has its own tiers")
     files = [arguments.into] if arguments.into is not None else output_files(takes, arguments.output, ".eaf")
     options = _writing_options(arguments)
-    face, layout = read_face_and_layout(arguments)
-    model = load_model(arguments.classifier)
+    _import_for_solving()
     failed = 0
-    for take, file in progress(list(zip(takes, files, strict=True)), "annotating"):
-        try:
-            annotate_file(take, file, arguments, options, face=face, layout=layout, model=model)
-        except SignfaceError as error:
-            if len(takes) == 1:
-                raise
-            failed += 1
-            print(f"signface: {error}", file=sys.stderr)
+    with ThreadPoolExecutor(1) as beside:
+        model = beside.submit(_load_model, arguments.classifier)
+        face, layout = read_face_and_layout(arguments)
+        for take, file in progress(list(zip(takes, files, strict=True)), "annotating"):
+            try:
+                annotate_file(take, file, arguments, options, face=face, layout=layout, model=model)
+            except SignfaceError as error:
+                if len(takes) == 1 or error is model.exception():
+                    raise
+                failed += 1
+                print(f"signface: {error}", file=sys.stderr)
     if failed:
         print(f"signface: {failed} of {len(takes)} takes could not be annotated", file=sys.stderr)
     return 2 if failed else 0
+
+
+def _import_for_solving() -> None:
+    """Import what reading and solving need, before a thread imports other things beside them.
+
+    Two threads that import packages which import one another can meet each other's half-made modules.
+    """
+    import scipy.ndimage
+    import scipy.sparse.linalg
+    import scipy.spatial.transform  # noqa: F401
+
+    import signface.annotation
+    import signface.face.layout_files
+    import signface.solve.solving
+    import signface.takes.reading  # noqa: F401
+
+
+def _load_model(name: str) -> TrainedModel:
+    """The classifier, and what labelling and writing import: a second's work, done while the first take is solved."""
+    import signface.elan.output
+    import signface.label.labelling  # noqa: F401
+    from signface.label.persistence import hasten, load_model
+
+    hasten()
+    return load_model(name)
 
 
 def _writing_options(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -122,21 +148,21 @@ def annotate_file(
     *,
     face: FaceModel,
     layout: MarkerLayout | None,
-    model: TrainedModel,
+    model: Future[TrainedModel],
 ) -> None:
     """Annotate one recording into one .eaf and say what was found."""
-    from signface.annotation import annotate, summarise, write_annotation
-    from signface.takes.reading import read_recording
+    from signface.annotation import annotate, describe, summarise, write_annotation
+    from signface.takes.reading import open_recording
 
-    found = annotate(
-        read_recording(take),
-        model=model,
+    descriptors = describe(
+        open_recording(take),
         face=face,
         layout=layout,
         neutral=arguments.neutral,
         method=arguments.method,
         alpha=arguments.alpha,
     )
+    found = annotate(descriptors, model=model.result())
     write_annotation(found, file, **options)
     if arguments.figure:
         save_picture(found, face, file.with_suffix(".png"))

@@ -25,11 +25,11 @@ def run(arguments: argparse.Namespace) -> None:
     from signface.descriptors import Descriptors
     from signface.segment.segmentation import segment
     from signface.segment.segments import write_segments
-    from signface.takes.reading import read_recording
+    from signface.takes.reading import open_recording
 
     if arguments.output.suffix.lower() != ".csv":
         raise SignfaceError("segments are written as .csv", file=arguments.output)
-    descriptors = read_recording(arguments.recording)
+    descriptors = open_recording(arguments.recording)
     if not isinstance(descriptors, Descriptors):
         face, layout = read_face_and_layout(arguments)
         descriptors = describe(

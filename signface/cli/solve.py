@@ -28,9 +28,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Solve every take; those that cannot be are named, and the others still are."""
-    from signface.annotation import describe, median_residual
-    from signface.descriptors import write_weights
-    from signface.takes.reading import read_recording
+    import numpy as np
+
+    from signface.annotation import describe_pieces, median_known
+    from signface.descriptors import WeightsWriter
+    from signface.takes.reading import open_recording
 
     ending = arguments.output.suffix.lower()
     suffix = ending if ending in (".csv", ".parquet") else f".{arguments.format}"
@@ -41,22 +43,27 @@ def run(arguments: argparse.Namespace) -> int:
     failed = 0
     for take, file in progress(list(zip(arguments.takes, files, strict=True)), "solving"):
         try:
-            descriptors = describe(
-                read_recording(take),
-                face=face,
-                layout=layout,
-                neutral=arguments.neutral,
-                method=arguments.method,
-                alpha=arguments.alpha,
-            )
-            write_weights(descriptors, file)
+            residuals: list[np.ndarray] = []
+            with WeightsWriter(file) as writer:
+                for piece in describe_pieces(
+                    open_recording(take),
+                    face=face,
+                    layout=layout,
+                    neutral=arguments.neutral,
+                    method=arguments.method,
+                    alpha=arguments.alpha,
+                    progress=progress,
+                ):
+                    writer.append(piece)
+                    assert piece.residual is not None
+                    residuals.append(piece.residual)
         except SignfaceError as error:
             if len(files) == 1:
                 raise
             failed += 1
             print(f"signface: {error}", file=sys.stderr)
             continue
-        residual = median_residual(descriptors)
+        residual = median_known(np.concatenate(residuals))
         fit = "unknown" if residual is None else f"{residual:.2f} mm"
-        print(f"{file}: {descriptors.n_frames} frames, {len(descriptors.names)} bases, median residual {fit}")
+        print(f"{file}: {writer.frames} frames, {len(piece.names)} bases, median residual {fit}")
     return 2 if failed else 0

@@ -129,18 +129,18 @@ def choose_layout(take_labels: Sequence[str], face: FaceModel) -> MarkerLayout:
     """
     bare = {label.rsplit(":", 1)[-1].strip().casefold() for label in take_labels}
     best, fit = None, 0
-    for name in shipped("layouts", ".csv"):
-        layout = read_layout(name, face)
-        matched = sum(label.casefold() in bare for label in layout.face_labels)
+    for name, file in shipped("layouts", ".csv").items():
+        table = pd.read_csv(file, usecols=["marker", "role"], dtype=str, comment="#")
+        matched = int(table.loc[table["role"] == "face", "marker"].str.casefold().isin(bare).sum())
         if matched > fit:
-            best, fit = layout, matched
+            best, fit = name, matched
     if best is None or fit < FEWEST:
         some = ", ".join(list(take_labels)[:6])
         raise SignfaceError(
             f"no shipped layout knows the markers of this take ({some}, ...)",
             hint="make one with: signface layout suggest TAKE -o layout.csv, and give it as --layout",
         )
-    return best
+    return read_layout(best, face)
 
 
 def nearest_points(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

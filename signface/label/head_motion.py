@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.signal import savgol_filter
 
 from signface.descriptors import Descriptors
 
@@ -107,6 +106,8 @@ def _smoothed(angle: np.ndarray, rate: float) -> np.ndarray:
     whole = np.interp(frames, frames[~unknown], angle[~unknown])
     window = 2 * round(SMOOTHING_S * rate / 2) + 1
     if 3 < window <= len(whole):
+        from scipy.signal import savgol_filter  # slow to import
+
         whole = savgol_filter(whole, window, polyorder=2)
     return np.where(unknown, np.nan, whole)
 

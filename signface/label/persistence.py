@@ -2,6 +2,7 @@
 
 - `save_model`, `load_model`: write and read a trained classifier.
 - `read_card`: what a file holds, without loading the estimator.
+- `hasten`: make loading quick, on the command line.
 
 A file is the zip archive that skops writes, with one more entry, `signface.json`, the card. Object identities in
 skops' own schema are memory addresses, and zip entries carry the time of day; both are replaced by counters and a
@@ -10,8 +11,10 @@ fixed date, so that the same training writes the same bytes.
 
 from __future__ import annotations
 
+import importlib
 import io
 import json
+import sys
 import zipfile
 import zlib
 from dataclasses import asdict, fields
@@ -31,18 +34,32 @@ SCHEMA = "schema.json"
 #: What a file holds whose model gives intensities beside labels; others hold the labels' estimator alone.
 LABELS, INTENSITY = "labels", "intensity"
 
-#: Types that a file may hold beside the ones skops itself trusts. None of them runs code of the file's choosing.
+#: Types that a file may hold beside containers, arrays and plain values. None of them runs code of the file's choosing.
 TRUSTED = (
-    "sklearn.calibration._CalibratedClassifier",
-    "sklearn.calibration._SigmoidCalibration",
-    "sklearn.model_selection._split.StratifiedKFold",
-    "sklearn.tree._tree.Tree",
+    "signface.label.crf.ChainLabeller",
+    "signface.label.gru.RecurrentLabeller",
     "signface.label.intensity.IntensityClassifier",
     "signface.label.intensity.OrdinalClassifier",
     "signface.label.sequence.SequenceLabeller",
-    "signface.label.crf.ChainLabeller",
-    "signface.label.gru.RecurrentLabeller",
+    "sklearn.calibration.CalibratedClassifierCV",
+    "sklearn.calibration._CalibratedClassifier",
+    "sklearn.calibration._SigmoidCalibration",
+    "sklearn.discriminant_analysis.LinearDiscriminantAnalysis",
+    "sklearn.ensemble._bagging.BaggingClassifier",
+    "sklearn.ensemble._forest.RandomForestClassifier",
+    "sklearn.ensemble._hist_gradient_boosting.gradient_boosting.HistGradientBoostingClassifier",
     "sklearn.ensemble._hist_gradient_boosting.predictor.TreePredictor",
+    "sklearn.linear_model._logistic.LogisticRegression",
+    "sklearn.model_selection._split.StratifiedKFold",
+    "sklearn.neighbors._classification.KNeighborsClassifier",
+    "sklearn.neural_network._multilayer_perceptron.MLPClassifier",
+    "sklearn.pipeline.Pipeline",
+    "sklearn.preprocessing._data.StandardScaler",
+    "sklearn.preprocessing._label.LabelBinarizer",
+    "sklearn.preprocessing._label.LabelEncoder",
+    "sklearn.svm._classes.SVC",
+    "sklearn.tree._classes.DecisionTreeClassifier",
+    "sklearn.tree._tree.Tree",
 )
 
 #: No trained classifier of ours unpacks to more (bytes): a small file that does is no honest one.
@@ -101,7 +118,8 @@ def read_card(name_or_path: str | PathLike[str]) -> Card:
 def load_model(name_or_path: str | PathLike[str] = "default") -> TrainedModel:
     """Read a trained classifier: a shipped one by its name, or a file.
 
-    Nothing of the file is run: it may hold only types that skops trusts and those of `TRUSTED`.
+    Nothing of the file is run: it may hold only types that skops trusts and those of `TRUSTED` (after `hasten`, only
+    the latter).
 
     Raises
     ------
@@ -115,6 +133,7 @@ def load_model(name_or_path: str | PathLike[str] = "default") -> TrainedModel:
     'forest'
     """
     import skops.io
+    from skops.io.exceptions import UntrustedTypesFoundException
 
     file = _found(name_or_path)
     card = read_card(file)
@@ -123,13 +142,6 @@ def load_model(name_or_path: str | PathLike[str] = "default") -> TrainedModel:
             if sum(entry.file_size for entry in archive.infolist()) > LARGEST or archive.testzip() is not None:
                 raise SignfaceError("is no classifier of signface, or is damaged", file=file)
         data = file.read_bytes()
-        foreign = sorted(set(skops.io.get_untrusted_types(data=data)) - set(TRUSTED))
-        if foreign:
-            raise SignfaceError(
-                f"holds types that a classifier of signface does not ({', '.join(foreign[:3])}) and was not loaded",
-                file=file,
-                hint="use only files that signface train wrote",
-            )
         estimator: Any = skops.io.loads(data, trusted=list(TRUSTED))
         intensity = None
         if isinstance(estimator, dict):
@@ -138,6 +150,13 @@ def load_model(name_or_path: str | PathLike[str] = "default") -> TrainedModel:
         features = int(estimator.n_features_in_)
     except SignfaceError:
         raise
+    except UntrustedTypesFoundException as error:
+        foreign = sorted(set(skops.io.get_untrusted_types(data=data)) - set(TRUSTED))
+        raise SignfaceError(
+            f"holds types that a classifier of signface does not ({', '.join(foreign[:3])}) and was not loaded",
+            file=file,
+            hint="use only files that signface train wrote",
+        ) from error
     except Exception as error:  # a damaged archive makes skops and scikit-learn fail in many ways
         raise SignfaceError(
             f"cannot be loaded as a classifier ({type(error).__name__})",
@@ -152,6 +171,26 @@ def load_model(name_or_path: str | PathLike[str] = "default") -> TrainedModel:
     ):
         raise SignfaceError("its estimator and its card do not belong together", file=file, hint="train it again")
     return TrainedModel(estimator, card, name=file.stem, intensity=intensity)
+
+
+def hasten() -> None:
+    """Make loading quick in a process of our own, by importing skops without what we do not need of it.
+
+    On import skops lists the estimators of all of scikit-learn, since it trusts them, and imports every module of it
+    to that end: two seconds, and six where PyTorch is installed. After this call it trusts none of them by itself but
+    those of `TRUSTED`. That is too strict for scripts which load other files by skops, so the command line calls it and
+    `load_model` does not.
+    """
+    import sklearn.utils
+
+    if "skops.io" in sys.modules:
+        return
+    everything = sklearn.utils.all_estimators
+    sklearn.utils.all_estimators = list
+    try:
+        importlib.import_module("skops.io")
+    finally:
+        sklearn.utils.all_estimators = everything
 
 
 def _found(name_or_path: str | PathLike[str]) -> Path:

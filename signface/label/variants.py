@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import savgol_filter
 from sklearn.base import BaseEstimator, TransformerMixin
 
 from signface.descriptors import Descriptors
@@ -192,6 +191,8 @@ def _slopes(weights: np.ndarray, rate: float) -> np.ndarray:
     window = min(max(3, 2 * round(SLOPE_S * rate / 2) + 1), frames if frames % 2 else frames - 1)
     if window < 3:
         return np.zeros_like(weights)
+    from scipy.signal import savgol_filter  # slow to import
+
     return savgol_filter(weights, window, polyorder=2, deriv=1, delta=1 / rate, axis=0, mode="mirror")
 
 
