@@ -22,10 +22,10 @@ EXAMPLE = """  signface evaluate corpora/feel -o reports/feel
   signface evaluate corpora/feel -o reports/feel --train-kinds IE,SE,EU --protocol across --classifiers net-hsmm"""
 
 
-#: What is printed of reference segments besides the accuracy, by its key in metrics.json; and of intensities.
+#: What is printed of manual segments besides the accuracy, by its key in metrics.json; and of intensities.
 RELIABILITY = {
-    "balanced_accuracy": "balanced accuracy of reference segments",
-    "calibration_error": "expected calibration error of reference segments",
+    "balanced_accuracy": "balanced accuracy of manual segments",
+    "calibration_error": "expected calibration error of manual segments",
 }
 INTENSITY = {
     "exact": "exact",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
+from zlib import crc32
 
 import numpy as np
 import pandas as pd
@@ -122,7 +123,8 @@ def _units(fold: Fold, by: str) -> list[list[Example]]:
 def _orders(fold: Fold, by: str, draws: int, seed: int) -> list[list[list[Example]]]:
     """The units of a fold in `draws` random orders, the same for the same takes whoever is tested."""
     units = _units(fold, by)
-    rng = np.random.default_rng([seed, len(units)])
+    names = " ".join(example.take for unit in units for example in unit)
+    rng = np.random.default_rng([seed, crc32(names.encode())])
     return [[units[index] for index in rng.permutation(len(units))] for _ in range(draws)]
 
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 BARS = {"manual_segments": ("#0072b2", ""), "automatic_segments": ("#e69f00", "////")}
 
 #: Points of a timeline's curves per second in a page that holds many.
-CURVE_RATE = 25.0
+CURVE_RATE = 40.0
 
 #: Letters of a name that figures have room for.
 LONGEST_NAME = 18
@@ -55,7 +55,11 @@ def draw_accuracy(protocols: Mapping[str, Mapping[str, Mapping]]) -> Figure:
             panel.set_title(PROTOCOL_TITLES.get(protocol, protocol))
         panels[0].set_ylabel("accuracy")
         handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=4)
+        order = [labels.index(name) for name in sorted(labels, key=lambda name: "segments" not in name)]  # bars first
+        wide = figure.get_figwidth() > 8
+        figure.legend(
+            [handles[k] for k in order], [labels[k] for k in order], loc="outside lower center", ncols=4 if wide else 2
+        )
         return figure
 
 
@@ -148,7 +152,7 @@ def draw_confusions(sections: Mapping[str, Mapping], *, columns: int = 3) -> Fig
         columns = min(columns, len(sections))
         lines = -(-len(sections) // columns)
         size = 0.34 * max(len(scores["labels"]) for scores in sections.values())
-        figure = _figure(columns * (size + 0.75), lines * (size + 0.85))
+        figure = _figure(columns * (size + 0.75), lines * (size + 1.05))
         axes = figure.subplots(lines, columns, squeeze=False).ravel()
         for panel, (title, scores) in zip(axes, sections.items()):
             counts = np.array(scores["confusion"], dtype=float)
@@ -217,9 +221,7 @@ def draw_learning_curve(table: pd.DataFrame) -> Figure:
         return figure
 
 
-def draw_take(
-    descriptors: Descriptors, rows: Mapping[str, Segments], *, title: str, marks: Mapping[str, np.ndarray]
-) -> Figure:
+def draw_take(descriptors: Descriptors, rows: Mapping[str, Segments], *, marks: Mapping[str, np.ndarray]) -> Figure:
     """One take: its energies, what was found, and the reference below; borders without a counterpart are marked.
 
     Parameters
@@ -227,13 +229,12 @@ def draw_take(
     descriptors : Descriptors
         At least three frames, one of them with weights.
     rows : mapping of str to Segments
-    title : str
     marks : mapping of str to (K,) array
         Row to the times that are marked on it (seconds).
     """
     with styled():
-        figure = _figure(9.4, 2.2 + 0.28 * len(rows))
-        draw_rows_on(figure, descriptors, rows, title=title, rate=CURVE_RATE, marks=marks)
+        figure = _figure(9.4, 2.0 + 0.28 * len(rows))
+        draw_rows_on(figure, descriptors, rows, title="", rate=CURVE_RATE, marks=marks)
         return figure
 
 
@@ -246,7 +247,7 @@ def draw_reliability(curves: Mapping[str, Sequence[Mapping[str, float]]]) -> Fig
         Title to bins, each with `confidence`, `accuracy` and `n`.
     """
     with styled():
-        figure = _figure(4.4, 3.9)
+        figure = _figure(5.0, 3.5)
         panel = figure.subplots()
         panel.plot([0, 1], [0, 1], color="#999999", linewidth=1, linestyle="--")
         for number, (name, bins) in enumerate(curves.items()):

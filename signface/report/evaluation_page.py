@@ -87,7 +87,15 @@ def _section(
     key: str, title: str, content: tuple[list[str], list[dict[str, Any]]], figures: Sequence[Drawn]
 ) -> dict[str, Any]:
     paragraphs, shown = content
-    return {"key": key, "title": title, "paragraphs": paragraphs, "tables": shown, "figures": list(figures)}
+    folded = "Every matrix in numbers" if key == "confusions" else ""
+    return {
+        "key": key,
+        "title": title,
+        "paragraphs": paragraphs,
+        "tables": shown,
+        "figures": list(figures),
+        "folded": folded,
+    }
 
 
 def _facts(evaluated: Evaluated) -> list[tuple[str, str, str]]:
@@ -137,13 +145,17 @@ def _labels(evaluated: Evaluated) -> tuple[list[str], list[dict[str, Any]]]:
 
 def _segmentation(evaluated: Evaluated) -> tuple[list[str], list[dict[str, Any]]]:
     table = tables.segmentation_table(evaluated.metrics["segmentation_by_kind"])
-    short = {"": "", "within": "same signer", "across": "other signers"}
+    short = {"": "nothing", "within": "same signer", "across": "other signers"}
     table["protocol"] = [short.get(protocol, protocol) for protocol in table["protocol"]]
     table["method"] = [words.method_words(method) for method in table["method"]]
     table = table.rename(
         columns={
             "protocol": "trained on",
-            **{column: column.replace("boundary ", "") for column in table.columns if column.startswith("boundary")},
+            **{  # a number and its unit stay on one line
+                column: "F1 at " + column.split(", ")[1].replace(" ", "\N{NO-BREAK SPACE}")
+                for column in table.columns
+                if column.startswith("boundary")
+            },
             "segments, reference": "reference",
             "segments, found": "found",
         }
@@ -165,7 +177,7 @@ def _confusions(evaluated: Evaluated) -> tuple[list[str], list[dict[str, Any]]]:
                 matrix = pd.DataFrame(scores["confusion"], columns=scores["labels"])
                 matrix.insert(0, "reference \\ found", scores["labels"])
                 caption = f"{name}, {title}, {tables.PROTOCOL_TITLES.get(protocol, protocol)}"
-                shown.append(page_table(matrix, f"confusion-{protocol}-{name}-{section}", caption, folded=True))
+                shown.append(page_table(matrix, f"confusion-{protocol}-{name}-{section}", caption))
     return [_most_confused(evaluated)], shown
 
 
@@ -321,7 +333,16 @@ def _importance(evaluated: Evaluated) -> tuple[list[str], list[dict[str, Any]]]:
             | {label: label.removeprefix("lost_") for label in labels}
         )
         note = "The last columns: share of the segments of each label that are lost with the base."
-        shown.append(page_table(table, f"importance-{name}", name, notes=[note], folded=True, decimals={}))
+        shown.append(
+            page_table(
+                table,
+                f"importance-{name}",
+                f"What {name} loses without each base",
+                notes=[note],
+                folded=True,
+                decimals={},
+            )
+        )
     paragraphs = [
         "A classifier that needs a base loses accuracy when the base’s weights are dealt out anew among the segments "
         "of the test takes. Left and right are dealt out together, since either could stand in for the other."

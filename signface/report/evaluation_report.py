@@ -262,7 +262,7 @@ def draw_all(evaluated: Evaluated) -> dict[str, list[Drawn]]:
                 "Lines: accuracy on manual segments against the number of training takes or signers; the table below "
                 "has the numbers.",
                 "Accuracy on the annotator’s segments against what was trained on, mean over random orders; bands: the "
-                "least and the most of them. The last point is everything.",
+                "least and the most of them. The last point is everything. The vertical axis is cut.",
             )
         )
     name = evaluated.best if evaluated.best in metrics["importance"] else next(iter(metrics["importance"]), None)
@@ -309,11 +309,10 @@ def _take(evaluated: Evaluated, verdict: TakeVerdict) -> Drawn:
         first: np.delete(found, [j for _, j in pairs]),
     }
     rows["reference"] = example.reference
-    agreement = "" if np.isnan(verdict.agreement) else f", {100 * verdict.agreement:.0f} % of the time in agreement"
     safe = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in verdict.take)
     return Drawn(
         f"take_{safe}",
-        figures.draw_take(example.descriptors, rows, title=f"{verdict.take} ({verdict.kind}){agreement}", marks=marks),
+        figures.draw_take(example.descriptors, rows, marks=marks),
         f"Timeline of {verdict.take}: energies above, the segments of {evaluated.best} and of the reference below. "
         + ("; ".join(verdict.reasons) or "Nothing is wrong."),
         "",

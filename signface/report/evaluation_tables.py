@@ -15,7 +15,7 @@ from typing import Any
 import pandas as pd
 
 SECTIONS = {
-    "manual_segments": "reference segments",
+    "manual_segments": "manual segments",
     "automatic_segments": "automatic segments",
     "frames": "frames",
 }

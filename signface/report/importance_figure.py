@@ -93,9 +93,9 @@ def _paint(figure, face: FaceModel, values: np.ndarray) -> None:  # type: ignore
     scale = LinearSegmentedColormap.from_list(
         "importance", [(STILL, STILL, STILL), *colormaps["Blues"]([0.45, 0.75, 1.0])]
     )
-    axes = figure.subplots(1, 2, width_ratios=[1.0, 0.9])
-    for panel, (yaw, name) in zip(axes, ((0.0, "front"), (50.0, "signer's left")), strict=True):
-        camera = face_camera(face, yaw=yaw, size=(300, 380), margin=1.12)
+    axes = figure.subplots(1, 2, width_ratios=[1.0, 1.0])
+    for panel, (yaw, name) in zip(axes, ((0.0, "front"), (40.0, "signer’s left")), strict=True):
+        camera = face_camera(face, yaw=yaw, size=(340, 380), margin=1.12)
         panel.imshow(render(face.mesh, camera, scale(values)[:, :3]), interpolation="antialiased")
         panel.set_axis_off()
         panel.set_title(name, fontsize=9, fontweight="normal", loc="center")

@@ -110,7 +110,7 @@ def draw_rows_on(
     if len(moving):
         spans = list(zip(moving["start_s"], moving["end_s"] - moving["start_s"], strict=True))
         above.broken_barh(spans, (0, top), color="#000000", alpha=0.06, lw=0)
-    above.set_title(title or descriptors.name, loc="left", fontsize=11)
+    above.set_title(descriptors.name if title is None else title, loc="left", fontsize=11)
     above.set_ylim(0, top)
     above.legend(loc="upper right", fontsize=8, frameon=False, ncols=2)
     for position, (name, segments) in enumerate(reversed(list(rows.items()))):

@@ -27,6 +27,9 @@ SHIFT_S = 0.08
 #: What an expression must be taken for another to be mentioned (s).
 LEAST_S = 0.20
 
+#: A stretch must be as long as that for its place to be named (s).
+LEAST_SHOWN_S = 0.1
+
 #: A residual this many times that of the middle take is called high.
 HIGH_RESIDUAL = 1.5
 
@@ -159,7 +162,7 @@ class _Lonely:
         shown = [("" if single else f"{len(run)} ") + _when(run) for run in sorted(longest, key=lambda run: run[0])]
         rest = "" if len(self.runs) <= PLACES else ", and elsewhere"
         noun = f"{self.count} border{'s' * (self.count != 1)} {what}"
-        return [(0.2 * self.count, f"{noun} {', '.join(shown)}{rest}")]
+        return [(0.2 * self.count, f"{noun}{' ' if single else ': '}{', '.join(shown)}{rest}")]
 
 
 def _when(run: np.ndarray) -> str:
@@ -195,9 +198,9 @@ def _confusions(parts: pd.DataFrame) -> list[tuple[float, str]]:
         if said not in AFFECTS or seconds < LEAST_S:  # what a transition takes of an expression is told as borders
             continue
         whole = float(held.loc[held["truth"] == truth, "length"].sum())
-        places = _joined(own)
+        places = [place for place in _joined(own) if place[1] - place[0] >= LEAST_SHOWN_S]
         shown = sorted(sorted(places, key=lambda place: place[0] - place[1])[:PLACES])
-        spelt = ", ".join(f"{start:.1f} to {end:.1f} s" for start, end in shown)
+        spelt = ", ".join(f"{start:.1f} to {end:.1f} s" for start, end in shown) or "in short stretches"
         more = ", and elsewhere" if len(places) > PLACES else ""
         words = f"{AFFECTS[str(truth)]} taken for {AFFECTS[str(said)]} during {seconds:.1f} of its {whole:.1f} s"
         reasons.append((seconds, f"{words} ({spelt}{more})"))
