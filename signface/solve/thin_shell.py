@@ -27,6 +27,8 @@ shrinks what it holds, so that a second solve, as convex, lets go of the weights
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from signface.errors import SignfaceError
@@ -47,8 +49,13 @@ SPARSITY = 0.006
 #: Variance of the head's residual shift (and of its turn, at the markers' distance from their centre) beside that of a
 #: marker's coordinate.
 HEAD_SLACK = 0.3
+#: A marker further from the solved face than this share of a typical base's root mean square displacement (1.3 mm on the
+#: default face) pulls no harder than one at that distance.
+SLIP = 0.4
+#: Rounds in which markers that stand too far off are drawn nearer. More change nothing that matters.
+SLIP_ROUNDS = 2
 #: The length of the gradient at which a frame counts as solved. Energies are of the order of 1.
-GRADIENT = 1e-8
+GRADIENT = 1e-9
 #: Frames solved at a time, so that a long take needs little memory.
 CHUNK = 16384
 
@@ -69,6 +76,9 @@ class ThinShellSolver:
         weakened by it.
     head_slack : float
         How far the head's motion may have been taken away wrongly, 0 or more; 0 trusts the head markers.
+    slip : float
+        How far a marker may be from the solved face before it counts less (Huber's estimator), as a share of what a
+        typical base does to a marker; 0 trusts every marker. A marker that has slipped does not bend the face then.
     signer_bases : (N, P, 3) array, optional
         The bases as this signer shows them at the markers (`signface.solve.calibration.calibrate`); by default the
         avatar's.
@@ -102,19 +112,20 @@ class ThinShellSolver:
         sparsity: float = SPARSITY,
         release: bool = True,
         head_slack: float = HEAD_SLACK,
+        slip: float = SLIP,
         signer_bases: np.ndarray | None = None,
         threads: int | None = None,
     ) -> None:
         if not (np.isfinite(alpha) and 0.0 <= alpha <= 1.0):
             raise SignfaceError(f"alpha must lie between 0 and 1, not {alpha}")
-        if not (np.isfinite(sparsity) and sparsity >= 0.0):
-            raise SignfaceError(f"sparsity must be 0 or more, not {sparsity}")
-        if not (np.isfinite(head_slack) and head_slack >= 0.0):
-            raise SignfaceError(f"head_slack must be 0 or more, not {head_slack}")
+        for name, value in {"sparsity": sparsity, "head_slack": head_slack, "slip": slip}.items():
+            if not (np.isfinite(value) and value >= 0.0):
+                raise SignfaceError(f"{name} must be 0 or more, not {value}")
         self.names = face.names
         self.alpha, self.sparsity, self.threads = float(alpha), float(sparsity), threads
         self.release = release and self.sparsity > 0.0 and self.alpha < 1.0
         self.markers = MarkerBases(face, layout, skin=self.alpha > 0.0, signer_bases=signer_bases)
+        self._reach = slip * np.sqrt(self.markers.scale / self.markers.n_markers)
         observed = self.markers.observed
         shell = np.zeros((int(observed.sum()),) * 2)
         for part in thin_shell_matrices(face):
@@ -189,14 +200,45 @@ class ThinShellSolver:
 
     def _solve_chunk(self, displacements: np.ndarray) -> Solution:
         rows = self.markers.rows(displacements)
+        weights, residual = self._optimum(rows)
+        self._draw_nearer(rows, weights, residual, self._optimum)
+        return Solution(weights, residual)
+
+    def _optimum(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         weights, residual = self._minimise(rows, self._whole)
         left = np.flatnonzero(np.isnan(residual))
         if len(left):
-            some, present = self.markers.checked(displacements[left])
+            some, present = self.markers.checked(rows[left].reshape(len(left), -1, 3))
             weights[left] = np.nan
             for pattern, frames in presence_patterns(present):
                 weights[left[frames]], residual[left[frames]] = self._minimise(some[frames], self._problem(pattern))
-        return Solution(weights, residual)
+        return weights, residual
+
+    def _draw_nearer(
+        self,
+        rows: np.ndarray,
+        weights: np.ndarray,
+        residual: np.ndarray,
+        solve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
+    ) -> None:
+        """Solve frames again in which markers stand too far off, with those drawn nearer; in place.
+
+        These are Huber's modified residuals (P. J. Huber, Robust Statistics, 1981, 7.8): the least squares of each
+        round have the same matrix, so that nothing is factorised anew for a frame's own marker weights.
+        """
+        frames = np.arange(len(rows))
+        for _ in range(SLIP_ROUNDS if self._reach > 0.0 else 0):
+            placed = weights[frames] @ self.markers.matrix.T
+            apart = (rows[frames] - placed).reshape(len(frames), -1, 3)
+            distance = np.sqrt(np.einsum("fpd,fpd->fp", apart, apart))
+            far = (distance > self._reach).any(axis=1)
+            if not far.any():
+                break
+            frames, apart, distance = frames[far], apart[far], distance[far]
+            apart *= np.minimum(1.0, self._reach / np.maximum(distance, self._reach))[:, :, None]
+            weights[frames] = solve(placed[far] + apart.reshape(len(frames), -1))[0]
+            placed = weights[frames] @ self.markers.matrix.T
+            residual[frames] = np.sqrt(3.0 * np.nanmean((rows[frames] - placed) ** 2, axis=1))
 
     def _minimise(
         self, rows: np.ndarray, problem: Problem, first: np.ndarray | None = None
@@ -232,6 +274,13 @@ class ThinShellSolver:
             self._pattern, self._pushed = present[0], self._problem(present[0])
         weights, residual = self._minimise(rows, self._pushed, self._last)
         self._last = weights[0, self._whole.places]
+        missing = np.repeat(~present[0], 3)
+        self._draw_nearer(
+            np.where(missing, np.nan, rows),
+            weights,
+            residual,
+            lambda nearer: self._minimise(np.where(missing, 0.0, nearer), self._pushed, self._last),
+        )
         return Solution(weights, residual)
 
     def uncertainty(self, weights: np.ndarray, marker_error: float) -> np.ndarray:
