@@ -47,13 +47,17 @@ from signface.solve.bounds import (
 )
 
 #: Steps after which a frame is left to the damped method.
-QUICK_STEPS = 40
+QUICK_STEPS = 60
+#: Steps after which every other one is halved.
+CIRCLE = 10
 #: Steps of the damped method, each halving the gradient at worst near the optimum.
 DAMPED_STEPS = 400
 #: A curvature in the kept inverse may be off by this share.
 OFF = 0.2
 #: The kept inverse is made anew after so many frames: each correction rounds.
 RENEW = 256
+#: The kept inverse is made anew, too, when a correction would leave this share of a curvature: the rest has cancelled.
+CANCELLED = 1e-4
 #: Up to this distance outside 0 to 1 the exponential is summed as a series, without a call.
 NEAR = SMOOTHING / 4
 #: Frames taken together where matrices are multiplied, so that a row of the matrix is read once for four of them.
@@ -152,41 +156,59 @@ def _follow(right, many, quad, free, stiffness, pull, tolerance, inverse, state,
         if steps[frame] < 0:
             continue
         steps[frame] = -2
-        some = n
-        for i in range(n):
-            which[i] = i
-        if age >= RENEW:
+        renew = age >= RENEW
+        if renew:
             age = 0
             for i in range(n):
-                for j in range(n):
-                    inverse[i, j] = free[i, j]
-            for i in range(n):
-                c = weight[i]
-                curve[i], taken[i] = 0.0, pull
-                if c < 0.0:
-                    curve[i], taken[i] = stiff, stiff * c
-                elif c < knee:
-                    curve[i], taken[i] = lean, lean * c
-                elif c > 1.0:
-                    curve[i], taken[i] = stiff, pull + stiff * (c - 1.0)
-                if curve[i] > 0.0:
-                    _correct(inverse, i, curve[i], move)
+                which[i] = i
+                bend[i], taken[i] = 0.0, pull
+                if weight[i] < 0.0:
+                    bend[i], taken[i] = stiff, stiff * weight[i]
+                elif weight[i] < knee:
+                    bend[i], taken[i] = lean, lean * weight[i]
+                elif weight[i] > 1.0:
+                    bend[i], taken[i] = stiff, pull + stiff * (weight[i] - 1.0)
             _combine(quad, weight, which, n, balance)
         age += 1
         for i in range(n):
             error[i] = balance[i] + taken[i] - right[frame, i]
         for step in range(QUICK_STEPS):
+            some = 0
+            for i in range(n):
+                which[some] = i
+                some += abs(error[i]) > 0.01 * tolerance
+            off = 0.0
+            for i in range(n):
+                off += 1.0 if abs(bend[i] - curve[i]) > OFF * bend[i] else 0.0
+            if off > 0.0:
+                for i in range(n):
+                    change = bend[i] - curve[i]
+                    if abs(change) > OFF * bend[i]:
+                        curve[i] = bend[i]
+                        renew |= change * inverse[i, i] < CANCELLED - 1.0
+                        if not renew:
+                            _correct(inverse, i, change, move)
+            if renew:
+                renew = False
+                for i in range(n):
+                    for j in range(n):
+                        inverse[i, j] = free[i, j]
+                for i in range(n):
+                    if curve[i] > 0.0:
+                        _correct(inverse, i, curve[i], move)
             _combine(inverse, error, which, some, move)
+            # Short loops over few arrays each, so that the compiler makes vectors of them.
+            # Steps that go round in a circle, from piece to piece, are broken by half ones.
+            part = 0.5 if step > CIRCLE and step % 2 else 1.0
             for i in range(n):
-                taken[i] -= curve[i] * move[i]
+                taken[i] -= part * curve[i] * move[i]
             for i in range(n):
-                weight[i] -= move[i]
-            # Short loops over few arrays each, so that the compiler can make vectors of them.
-            farthest = 0.0
+                weight[i] -= part * move[i]
             for i in range(n):
                 below = -weight[i] if weight[i] < 0.0 else 0.0
                 above = weight[i] - 1.0 if weight[i] > 1.0 else 0.0
                 move[i] = below + above
+            farthest = 0.0
             for i in range(n):
                 farthest = max(farthest, move[i])
             for i in range(n):  # exp(x) - 1
@@ -208,18 +230,18 @@ def _follow(right, many, quad, free, stiffness, pull, tolerance, inverse, state,
                         continue
                     # Far outside, the exponential would throw the next step away. It is linearised no further out than
                     # where its slope is what the last step took it to be, or one smoothing.
-                    x = far
-                    if far > SMOOTHING:
-                        force = -taken[i] if weight[i] < 0.0 else taken[i] - pull
-                        x = min(far, max(SMOOTHING, SMOOTHING * log1p(max(force, 0.0) / stiffness)))
-                    if x < far:
+                    force = -taken[i] if weight[i] < 0.0 else taken[i] - pull
+                    x = min(far, SMOOTHING * log1p(force / stiffness) if force > 0.0 else SMOOTHING)
+                    if far - x > 0.01 * SMOOTHING:
                         farthest = inf
+                    else:
+                        x = far
                     bend[i] = stiff * exp(x / SMOOTHING)
                     held = bend[i] * SMOOTHING - stiffness + bend[i] * (far - x)
                     true[i] = -held if weight[i] < 0.0 else pull + held
             total = 0.0
             for i in range(n):
-                apart = true[i] - taken[i]
+                apart = true[i] - taken[i] + (1.0 - part) * error[i]
                 error[i] = apart
                 total += apart * apart
             for i in range(n):
@@ -236,13 +258,7 @@ def _follow(right, many, quad, free, stiffness, pull, tolerance, inverse, state,
                 if total <= 4.0 * tolerance * tolerance:
                     steps[frame] = step + 1
                     break
-            some = 0
-            for i in range(n):
-                which[some] = i
-                some += abs(error[i]) > 0.01 * tolerance
-                if abs(bend[i] - curve[i]) > OFF * bend[i]:
-                    _correct(inverse, i, bend[i] - curve[i], move)
-                    curve[i] = bend[i]
+                renew = True
         for i in range(n):
             solved[frame, i] = weight[i]
         if steps[frame] < 0:
