@@ -94,6 +94,12 @@ def run(arguments: argparse.Namespace) -> None:
     whole = read_corpus(arguments.corpus)
     one = None if arguments.signer in ("all", "each") else [arguments.signer]
     corpus = whole.select(kinds=arguments.kinds, signers=one)
+    if not len(corpus):
+        raise SignfaceError(
+            f"the signer {arguments.signer} has no take of the kind {', '.join(arguments.kinds)}",
+            file=whole.folder,
+            hint="name other kinds or another signer",
+        )
     annotated = sum(take.annotation is not None for take in corpus)
     examples = solve_examples(
         corpus,

@@ -86,11 +86,18 @@ def _examples(
     for entry, origin, stored in zip(entries, origins, found, strict=True):
         descriptors = next(solved)[0] if stored is None else stored
         assert entry.annotation is not None
+        reference = read_reference(entry.annotation, entry.signer)
+        if reference.table.empty:
+            raise SignfaceError(
+                f"its reference annotation is empty (signer {entry.signer})",
+                file=entry.annotation,
+                hint="annotate the take, or leave out its annotation in takes.csv",
+            )
         yield Example(
             take=origin.take,
             signer=entry.signer,
             kind=entry.kind,
             descriptors=descriptors,
-            reference=read_reference(entry.annotation, entry.signer),
+            reference=reference,
             sentence=entry.sentence,
         )
