@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import difflib
 
+import numpy as np
+
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.solve.direct import ThinShellDeformation
 from signface.solve.linear import Bounded, LeastSquares, NonNegative
 from signface.solve.solver import Solver
-from signface.solve.thin_shell import ALPHA, ThinShellSolver
+from signface.solve.thin_shell import ThinShellSolver
 
 #: name: what it is, for `--help` and reports.
 METHODS = {
@@ -25,7 +27,14 @@ METHODS = {
 }
 
 
-def make_solver(method: str, face: FaceModel, layout: MarkerLayout, *, alpha: float | None = None) -> Solver:
+def make_solver(
+    method: str,
+    face: FaceModel,
+    layout: MarkerLayout,
+    *,
+    signer_bases: np.ndarray | None = None,
+    **options: float | None,
+) -> Solver:
     """A solver by name.
 
     Parameters
@@ -34,24 +43,32 @@ def make_solver(method: str, face: FaceModel, layout: MarkerLayout, *, alpha: fl
         A key of `METHODS`.
     face : FaceModel
     layout : MarkerLayout
-    alpha : float, optional
-        Weight of the thin shell, 0 to 1; only for `thin-shell`.
+    signer_bases : (N, P, 3) array, optional
+        The signer's bases at the markers; only for `thin-shell`.
+    **options
+        `alpha`, `sparsity`, `head_slack`, `slip`: see `ThinShellSolver`; only for `thin-shell`. None is its default.
 
     Raises
     ------
     SignfaceError
-        There is no such method, or it has no alpha.
+        There is no such method, or it has no such option.
     """
+    given = {name: value for name, value in options.items() if value is not None}
     if method == "thin-shell":
-        return ThinShellSolver(face, layout, alpha=ALPHA if alpha is None else alpha)
+        return ThinShellSolver(face, layout, signer_bases=signer_bases, **given)  # type: ignore[arg-type]
     if method not in METHODS:
         close = difflib.get_close_matches(method, METHODS, n=1)
         raise SignfaceError(
             f"no method is called {method!r}",
             hint=f"did you mean {close[0]}" if close else f"the methods are {', '.join(METHODS)}",
         )
-    if alpha is not None:
-        raise SignfaceError(f"the method {method} has no alpha", hint="leave --alpha out, or use thin-shell")
+    if given:
+        name = next(iter(given))
+        raise SignfaceError(
+            f"the method {method} has no {name}", hint=f"leave --{name.replace('_', '-')} out, or use thin-shell"
+        )
+    if signer_bases is not None:
+        raise SignfaceError(f"the method {method} cannot use a signer's bases", hint="use thin-shell")
     rivals = {"least-squares": LeastSquares, "nnls": NonNegative, "bounded": Bounded}
     if method in rivals:
         return rivals[method](face, layout)

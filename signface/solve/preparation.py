@@ -7,6 +7,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,8 @@ from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.solve.adaptation import MorphologicalAdaptation, SimilarityAdaptation, make_adaptation
+from signface.solve.creep import RATE_HZ, Creep
+from signface.solve.range_of_motion import read_signer
 from signface.solve.resting import resting_time
 from signface.solve.solver import Solution
 from signface.takes.cleaning import CleanRecording, Progress, silently
@@ -44,6 +48,10 @@ class Preparation:
     ----------
     recording, face, layout, neutral, adaptation, short_gap_s, long_gap_s, cutoff_hz, filter_method, head_fallback
         As for `signface.solve.solving.solve_take`.
+    creep : bool
+        Take away what the markers creep along the skin, see `signface.solve.creep`.
+    signer : path, optional
+        A file of the signer's own bases, see `signface.solve.range_of_motion`.
     piece : int
         Frames worked on at a time.
     progress : callable, optional
@@ -58,6 +66,8 @@ class Preparation:
         From the signer's face, in its neutral pose, to the avatar's.
     neutral_s : float
         Time of the neutral frame.
+    signer_bases : (N, P, 3) array or None
+        The signer's bases at the layout's markers; None where the avatar's serve.
     note : str
         What was done, for the history.
 
@@ -80,6 +90,8 @@ class Preparation:
         cutoff_hz: float = CUTOFF_HZ,
         filter_method: str = "butterworth",
         head_fallback: str | None = None,
+        creep: bool = False,
+        signer: str | PathLike[str] | None = None,
         piece: int = PIECE,
         progress: Progress = silently,
     ) -> None:
@@ -135,6 +147,17 @@ class Preparation:
         self.note = f"neutral frame {found} at {time:.3f} s; adapted to {face.name}"
         self.note += f" ({self.adaptation.description}) by {len(shown)} markers of {layout.name}"
         self.note += f" without {', '.join(dropped[:5])}{' ...' * (len(dropped) > 5)}" if dropped else ""
+        self.signer_bases = None if signer is None else read_signer(signer, face, self.layout)
+        self.note += "" if signer is None else f"; bases of the signer in {Path(signer).name}"
+        self._creep: Creep | None = None
+        if creep:
+            step = max(1, round(view.rate / RATE_HZ))
+            rate = view.rate / step
+            self._creep = Creep(
+                self._moved(view.positions[::step]), rate, face, self.layout, signer_bases=self.signer_bases
+            )
+            self._creep_step = rate / clean.rate
+            self.note += f"; creep of {self._creep.size_mm:.2f} mm taken away"
 
     def _around(self, frame: int) -> tuple[int, int]:
         """First frame, and frame after the last, of the window that neutral places are medians of."""
@@ -150,6 +173,14 @@ class Preparation:
         poses = self._head.poses(aligned, own if noted else slice(0))[own]
         return apply(inverse(poses), aligned[own][:, self._columns]), poses
 
+    def _moved(self, positions: np.ndarray) -> np.ndarray:
+        """(F, P, 3) displacements on the avatar in (F, M, 3) single frames, NaN where the head is not seen."""
+        aligned = apply(self._onto, positions)
+        poses = self._head.poses(aligned, slice(0))
+        seen = np.isfinite(aligned[:, [self.recording.labels.index(label) for label in self._head.labels], 0])
+        poses[seen.sum(axis=1) < 3] = np.nan  # a pose bridged between frames so far apart says nothing
+        return self.adaptation.transform(apply(inverse(poses), aligned[:, self._columns])) - self._rest
+
     def frames(self, begin: int, end: int) -> tuple[np.ndarray, np.ndarray]:
         """Frames of the recording, ready to be solved.
 
@@ -163,7 +194,10 @@ class Preparation:
         """
         still, poses = self._still(begin, end, noted=True)
         # Against the adapted neutral, not the avatar's: where the map passes by the markers, rest must still be rest.
-        return self.adaptation.transform(still) - self._rest, poses
+        displacements = self.adaptation.transform(still) - self._rest
+        if self._creep is not None:
+            displacements -= self._creep.at(np.arange(begin, end) * self._creep_step)
+        return displacements, poses
 
     @property
     def history(self) -> tuple[str, ...]:

@@ -52,8 +52,13 @@ def solve_take(
         Time in seconds of a frame with a neutral face; `auto` looks for one.
     adaptation : str
         `similarity` or `rbf` (the thesis's), see `signface.solve.adaptation`.
-    method, alpha
+    method, alpha, sparsity, head_slack, slip
         See `signface.solve.methods.make_solver`.
+    creep : bool, optional
+        Take away what the markers creep along the skin (`signface.solve.creep`); by default for the thin shell, and
+        not for its rivals.
+    signer : path, optional
+        A file of the signer's own bases, made by `signface calibrate`; only the thin shell uses it.
     short_gap_s, long_gap_s : float
         Longest gaps that are filled (seconds), see `signface.takes.gaps.fill_gaps`.
     cutoff_hz, filter_method
@@ -112,6 +117,10 @@ def solve_pieces(
     *,
     method: str = "thin-shell",
     alpha: float | None = None,
+    sparsity: float | None = None,
+    head_slack: float | None = None,
+    slip: float | None = None,
+    creep: bool | None = None,
     piece: int = PIECE,
     progress: Progress = silently,
     **options: Any,
@@ -127,9 +136,12 @@ def solve_pieces(
     """
     if piece < 1:
         raise SignfaceError(f"a piece has one frame or more, not {piece}")
-    preparation = Preparation(recording, face, layout, piece=piece, progress=progress, **options)
-    solver = make_solver(method, face, preparation.layout, alpha=alpha)
-    note = f"{preparation.note}; solve {method}" + (f" alpha={alpha:g}" if alpha is not None else "")
+    given = {"alpha": alpha, "sparsity": sparsity, "head_slack": head_slack, "slip": slip}
+    given = {name: value for name, value in given.items() if value is not None}
+    creep = method == "thin-shell" if creep is None else creep
+    preparation = Preparation(recording, face, layout, creep=creep, piece=piece, progress=progress, **options)
+    solver = make_solver(method, face, preparation.layout, signer_bases=preparation.signer_bases, **given)
+    note = f"{preparation.note}; solve {method}" + "".join(f" {name}={value:g}" for name, value in given.items())
     for begin, end in progress(pieces(recording.n_frames, piece), "solving"):
         displacements, head = preparation.frames(begin, end)
         solution = solver.solve(displacements)
