@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 from zlib import crc32
 
@@ -21,6 +22,7 @@ from signface.label.labelling import label_spans, segment_means
 from signface.label.model import TrainedModel
 from signface.label.training import train_model
 from signface.label.variants import signer_level
+from signface.segment.segments import Segments
 
 if TYPE_CHECKING:
     from signface.evaluate.protocol import Fold
@@ -113,11 +115,19 @@ def learning_curve(
 
 def _units(fold: Fold, by: str) -> list[list[Example]]:
     """What is drawn: each training take, or all training takes of each signer."""
-    ordered = sorted(fold.train, key=lambda example: (example.signer, example.kind, example.take))
+    ordered = [
+        replace(example, reference=_without_intensity(example.reference))
+        for example in sorted(fold.train, key=lambda example: (example.signer, example.kind, example.take))
+    ]
     if by == "takes":
         return [[example] for example in ordered]
     signers = sorted({example.signer for example in ordered})
     return [[example for example in ordered if example.signer == signer] for signer in signers]
+
+
+def _without_intensity(reference: Segments) -> Segments:
+    """The reference without intensities: they are not asked for here, and would be learnt every time."""
+    return replace(reference, table=reference.table.drop(columns="intensity", errors="ignore"))
 
 
 def _orders(fold: Fold, by: str, draws: int, seed: int) -> list[list[list[Example]]]:
@@ -152,19 +162,20 @@ def _plan(folds: Sequence[Fold], by: str, sizes: list[int], draws: int, most_tak
 def _hits(fold: Fold, model: TrainedModel) -> int:
     """How many stable segments of the reference of the test takes get their label."""
     level = None if model.card.normalise == "none" else signer_level([example.descriptors for example in fold.test])
-    right = 0
+    right, means, truths = 0, [], []
     for example in fold.test:
         spans = example.stable[["start_s", "end_s"]].to_numpy(float)
         truth = example.stable["label"].to_numpy(object)
-        means = None
-        if can_be_judged(model) and len(spans):  # the confidence, which takes the longest, is not wanted here
-            means = segment_means(model.seen(example.descriptors, level), spans)
-        if means is not None and np.isfinite(means).all():
-            estimator: Any = model.estimator
-            found = np.asarray(estimator.predict(means), dtype=object)
-        else:
+        own = segment_means(model.seen(example.descriptors, level), spans) if can_be_judged(model) else None
+        if own is not None and np.isfinite(own).all():  # the confidence, which takes the longest, is not wanted here
+            means.append(own)
+            truths.append(truth)
+        elif len(spans):
             found = np.array(label_spans(example.descriptors, spans, model, level=level)[0], dtype=object)
-        right += int((found == truth).sum())
+            right += int((found == truth).sum())
+    if sum(map(len, means)):
+        estimator: Any = model.estimator
+        right += int((estimator.predict(np.concatenate(means)) == np.concatenate(truths)).sum())
     return right
 
 
