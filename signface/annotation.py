@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from signface.face.layout import MarkerLayout
     from signface.face.model import FaceModel
     from signface.label.model import TrainedModel
+    from signface.label.variants import SignerLevel
     from signface.takes.recording import Recording
 
 
@@ -56,6 +57,7 @@ def annotate(
     neutral: str | float = "auto",
     method: str = "thin-shell",
     alpha: float | None = None,
+    level: SignerLevel | None = None,
 ) -> Annotation:
     """Solve, segment and label one recording (Reverdy 2019, chapters 4 and 5).
 
@@ -75,6 +77,9 @@ def annotate(
         One of `signface.solve.methods.METHODS`.
     alpha : float, optional
         Weight of the thin shell, 0 to 1; the method's own default when not given.
+    level : SignerLevel, optional
+        What a model that normalises signers normalises by (`signface.label.variants.signer_level` of takes of the
+        signer); the level of this take alone when not given.
 
     Raises
     ------
@@ -91,7 +96,7 @@ def annotate(
     from signface.label.labelling import find_segments
 
     descriptors = describe(recording, face=face, layout=layout, neutral=neutral, method=method, alpha=alpha)
-    segments = find_segments(descriptors, model)
+    segments = find_segments(descriptors, model, level=level)
     return Annotation(descriptors, segments, model.name)
 
 

@@ -239,3 +239,22 @@ def test_a_job_that_kills_its_process_fails_alone():
     found = dict(on_cores(die_of_seven, list(range(20)), workers=2))
     assert isinstance(found.pop(7), WorkerDied)
     assert found == {number: number**2 for number in range(20) if number != 7}
+
+
+def test_channels_doubts_and_the_template_of_a_lab_are_written_as_annotate_writes_them(feel, ready, tmp_path):
+    """And what is written otherwise is written again, but not solved again."""
+    manifest = feel / "takes.csv"
+    manifest.write_text("".join(manifest.read_text().splitlines(keepends=True)[:3]))
+    run = ["corpus", "run", str(feel), "--classifier", str(ready / "mine.skops"), "--workers", "1"]
+    assert main(run) == 0
+    how = ["--channels", "--doubtful", "0.9"]
+    assert main([*run, *how]) == 0
+    annotated = next((feel / "annotated").rglob("*.eaf"))
+    tiers = {tier.get("TIER_ID") for tier in etree.parse(annotated).getroot().iterfind("TIER")}
+    assert {"affect@S1", "intensity@S1"} <= tiers
+    assert any("doubt" in name for name in tiers)
+    assert main([*run, "--template", str(annotated)]) == 0  # a template may be any .eaf
+    assert main(["corpus", "run", str(feel), "--doubtful", "7"]) == 2
+    assert main([*run, "--template", str(tmp_path / "none.etf")]) == 2
+    states_after = [outcome.state for outcome in run_corpus(read_corpus(feel), classifier=str(ready / "mine.skops"))]
+    assert set(states_after) == {DONE}

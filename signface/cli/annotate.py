@@ -3,20 +3,29 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from signface.cli.options import add_solve_arguments, output_files, read_face_and_layout
+from signface.cli.options import (
+    add_solve_arguments,
+    add_writing_arguments,
+    output_files,
+    read_face_and_layout,
+    writing_options,
+)
 from signface.cli.progress import progress
 from signface.errors import SignfaceError
 
 if TYPE_CHECKING:
     from signface.annotation import Annotation
+    from signface.descriptors import Descriptors
     from signface.face.layout import MarkerLayout
     from signface.face.model import FaceModel
     from signface.label.model import TrainedModel
+    from signface.label.variants import SignerLevel
 
 EXAMPLE = """  signface annotate take.c3d -o take.eaf
   signface annotate recordings/*.c3d -o annotated/ --signer S1
@@ -38,25 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--into", type=Path, metavar="EAF", help="add our tiers to this .eaf, and touch nothing else in it"
     )
-    parser.add_argument(
-        "--template", type=Path, metavar="ETF_OR_EAF", help="a lab's template, whose tiers and vocabularies are used"
-    )
-    parser.add_argument(
-        "--mapping", type=Path, metavar="FILE", help="which channel goes to which tier (signface elan map writes one)"
-    )
-    parser.add_argument(
-        "--channels",
-        nargs="?",
-        const="default",
-        metavar="FILE",
-        help="also brows, eyes, gaze, nose, mouth, cheeks, head and intensity; FILE holds other thresholds",
-    )
-    parser.add_argument(
-        "--doubtful",
-        type=float,
-        metavar="CONFIDENCE",
-        help="also a tier with the segments whose confidence is below this, 0 to 1",
-    )
+    add_writing_arguments(parser)
     parser.add_argument(
         "--figure", action="store_true", help="also draw the face and the timeline of each take (TAKE.png)"
     )
@@ -77,15 +68,38 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.into is not None and arguments.template is not None:
         raise SignfaceError("--into and --template exclude each other", hint="the file of --into has its own tiers")
     files = [arguments.into] if arguments.into is not None else output_files(takes, arguments.output, ".eaf")
-    options = _writing_options(arguments)
+    options = {
+        **writing_options(arguments),
+        "signer": arguments.signer,
+        "video": arguments.video,
+        "into": arguments.into,
+        "replace": arguments.replace,
+    }
     _import_for_solving()
     failed = 0
     with ThreadPoolExecutor(1) as beside:
         model = beside.submit(_load_model, arguments.classifier)
         face, layout = read_face_and_layout(arguments)
+        known: dict[Path, Descriptors] = {}
+        level = None
+        if len(takes) > 1 and model.result().card.normalise == "signer":
+            from signface.label.variants import signer_level
+
+            known = _described(takes, arguments, face, layout)
+            level = signer_level(list(known.values())) if known else None
         for take, file in progress(list(zip(takes, files, strict=True)), "annotating"):
             try:
-                annotate_file(take, file, arguments, options, face=face, layout=layout, model=model)
+                annotate_file(
+                    take,
+                    file,
+                    arguments,
+                    options,
+                    face=face,
+                    layout=layout,
+                    model=model,
+                    solved=known.get(take),
+                    level=level,
+                )
             except SignfaceError as error:
                 if len(takes) == 1 or error is model.exception():
                     raise
@@ -121,23 +135,29 @@ def _load_model(name: str) -> TrainedModel:
     return load_model(name)
 
 
-def _writing_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """What `signface.elan.output.write_take` is told, read before anything is solved."""
-    from signface.elan.mapping import read_mapping
-    from signface.label.channels import read_channels
+def _described(
+    takes: list[Path], arguments: argparse.Namespace, face: FaceModel, layout: MarkerLayout | None
+) -> dict[Path, Descriptors]:
+    """The takes of the signer solved, for a classifier that normalises by all of them; without those that fail."""
+    found = {}
+    for take in progress(takes, "solving"):
+        with contextlib.suppress(SignfaceError):  # said when its turn comes
+            found[take] = _describe(take, arguments, face, layout)
+    return found
 
-    if arguments.doubtful is not None and not 0 <= arguments.doubtful <= 1:
-        raise SignfaceError(f"--doubtful is a confidence from 0 to 1, not {arguments.doubtful:g}")
-    return {
-        "signer": arguments.signer,
-        "video": arguments.video,
-        "channels": None if arguments.channels is None else read_channels(arguments.channels),
-        "doubtful_below": arguments.doubtful,
-        "template": arguments.template,
-        "into": arguments.into,
-        "mapping": None if arguments.mapping is None else read_mapping(arguments.mapping),
-        "replace": arguments.replace,
-    }
+
+def _describe(take: Path, arguments: argparse.Namespace, face: FaceModel, layout: MarkerLayout | None) -> Descriptors:
+    from signface.annotation import describe
+    from signface.takes.reading import open_recording
+
+    return describe(
+        open_recording(take),
+        face=face,
+        layout=layout,
+        neutral=arguments.neutral,
+        method=arguments.method,
+        alpha=arguments.alpha,
+    )
 
 
 def annotate_file(
@@ -149,20 +169,14 @@ def annotate_file(
     face: FaceModel,
     layout: MarkerLayout | None,
     model: Future[TrainedModel],
+    solved: Descriptors | None = None,
+    level: SignerLevel | None = None,
 ) -> None:
     """Annotate one recording into one .eaf and say what was found."""
-    from signface.annotation import annotate, describe, summarise, write_annotation
-    from signface.takes.reading import open_recording
+    from signface.annotation import annotate, summarise, write_annotation
 
-    descriptors = describe(
-        open_recording(take),
-        face=face,
-        layout=layout,
-        neutral=arguments.neutral,
-        method=arguments.method,
-        alpha=arguments.alpha,
-    )
-    found = annotate(descriptors, model=model.result())
+    descriptors = _describe(take, arguments, face, layout) if solved is None else solved
+    found = annotate(descriptors, model=model.result(), level=level)
     write_annotation(found, file, **options)
     if arguments.figure:
         save_picture(found, face, file.with_suffix(".png"))

@@ -6,12 +6,13 @@ import argparse
 import sys
 from pathlib import Path
 
-from signface.cli.options import add_face_arguments
+from signface.cli.options import add_face_arguments, add_writing_arguments, writing_options
 from signface.cli.progress import progress
 from signface.errors import SignfaceError
 
 EXAMPLE = """  signface corpus check corpora/feel
   signface corpus run corpora/feel
+  signface corpus run corpora/feel --channels --template lab.etf
   signface corpus run corpora/feel --scheduler tcp://10.0.0.1:8786
   signface corpus info corpora/feel
   signface corpus query corpora/feel "SELECT signer, avg(jawOpen) FROM descriptors GROUP BY signer" """
@@ -41,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     run_.add_argument(
         "--classifier", default="default", metavar="NAME_OR_FILE", help="a shipped classifier or a .skops file"
     )
+    add_writing_arguments(run_)
 
     info = actions.add_parser("info", help="what is in a corpus and in its store, and how to open it")
     _add_corpus(info)
@@ -106,6 +108,7 @@ def run_all(arguments: argparse.Namespace) -> int:
         classifier=arguments.classifier,
         workers=arguments.workers,
         scheduler=arguments.scheduler,
+        writing=writing_options(arguments),
     )
     count = dict.fromkeys((DONE, BEFORE, CORRECTED, FAILED), 0)
     solved = 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from signface.errors import SignfaceError
 
@@ -42,6 +42,50 @@ def add_solve_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--alpha", type=float, metavar="A", help="weight of the thin shell, 0 to 1 (default: the method's own)"
     )
+
+
+def add_writing_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add `--template`, `--mapping`, `--channels` and `--doubtful`."""
+    parser.add_argument(
+        "--template", type=Path, metavar="ETF_OR_EAF", help="a lab's template, whose tiers and vocabularies are used"
+    )
+    parser.add_argument(
+        "--mapping", type=Path, metavar="FILE", help="which channel goes to which tier (signface elan map writes one)"
+    )
+    parser.add_argument(
+        "--channels",
+        nargs="?",
+        const="default",
+        metavar="FILE",
+        help="also brows, eyes, gaze, nose, mouth, cheeks, head and intensity; FILE holds other thresholds",
+    )
+    parser.add_argument(
+        "--doubtful",
+        type=float,
+        metavar="CONFIDENCE",
+        help="also a tier with the segments whose confidence is below this, 0 to 1",
+    )
+
+
+def writing_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What `signface.elan.output.write_take` is told of `add_writing_arguments`.
+
+    Raises
+    ------
+    SignfaceError
+        A file is missing or broken, or the confidence is none.
+    """
+    from signface.elan.mapping import read_mapping
+    from signface.label.channels import read_channels
+
+    if arguments.doubtful is not None and not 0 <= arguments.doubtful <= 1:
+        raise SignfaceError(f"--doubtful is a confidence from 0 to 1, not {arguments.doubtful:g}")
+    return {
+        "channels": None if arguments.channels is None else read_channels(arguments.channels),
+        "doubtful_below": arguments.doubtful,
+        "template": arguments.template,
+        "mapping": None if arguments.mapping is None else read_mapping(arguments.mapping),
+    }
 
 
 def neutral_time(text: str) -> float | str:

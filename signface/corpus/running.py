@@ -20,11 +20,11 @@ import re
 import socket
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from signface.corpus.cluster import WorkerDied, on_cluster, on_cores
 from signface.corpus.describing import recipe_of, stored_or_solved
@@ -78,6 +78,10 @@ class Job:
         SHA-256 of the classifier's file.
     code : str
         SHA-256 of the modules between descriptors and annotation.
+    writing : mapping
+        What `signface.elan.output.write_take` is told: `channels`, `doubtful_below`, `template`, `mapping`.
+    written : str
+        SHA-256 of all of that, the content of the template included.
     """
 
     entry: TakeEntry
@@ -87,6 +91,8 @@ class Job:
     classifier: str
     model: str
     code: str
+    writing: Mapping[str, Any]
+    written: str
 
     @property
     def take(self) -> str:
@@ -139,6 +145,7 @@ def run_corpus(
     classifier: str = "default",
     workers: int | None = None,
     scheduler: str | None = None,
+    writing: Mapping[str, Any] | None = None,
 ) -> Iterator[Outcome]:
     """Solve and annotate every take of a corpus; what is there already is not done again.
 
@@ -153,6 +160,8 @@ def run_corpus(
         Takes at a time on this machine; as many as it has cores by default.
     scheduler : str, optional
         Address of a Dask cluster to run on instead. Its machines see the corpus under the same path.
+    writing : mapping, optional
+        `channels`, `doubtful_below`, `template` and `mapping` of `signface.elan.output.write_take`.
 
     Yields
     ------
@@ -174,7 +183,7 @@ def run_corpus(
     output = folder / ANNOTATED if output is None else Path(os.path.abspath(output))
     store = DescriptorStore(folder)  # says at once when a newer signface wrote it
     recipe = make_recipe(face, layout, method=method, alpha=alpha)
-    jobs, failed = plan_jobs(corpus, output, recipe, classifier=classifier)
+    jobs, failed = plan_jobs(corpus, output, recipe, classifier=classifier, writing=writing)
     with only_run_in(output):
         yield from failed
         if scheduler is None:
@@ -191,14 +200,17 @@ def run_corpus(
         store.clean()
 
 
-def plan_jobs(corpus: Corpus, output: Path, recipe: Recipe, *, classifier: str) -> tuple[list[Job], list[Outcome]]:
+def plan_jobs(
+    corpus: Corpus, output: Path, recipe: Recipe, *, classifier: str, writing: Mapping[str, Any] | None = None
+) -> tuple[list[Job], list[Outcome]]:
     """The jobs of a run, with absolute paths, and the takes whose own face or layout is not there.
 
     Raises
     ------
     SignfaceError
-        Two takes would be written to the same file, or there is no such classifier.
+        Two takes would be written to the same file, or there is no such classifier or template.
     """
+    writing, written = _writing(writing or {})
     model, code = shipped_digest("classifiers", ".skops", classifier), code_digest(*ANNOTATING_CODE)
     folder = Path(os.path.abspath(corpus.folder))
     known: dict[tuple[str, str | None], Recipe] = {}
@@ -217,8 +229,22 @@ def plan_jobs(corpus: Corpus, output: Path, recipe: Recipe, *, classifier: str) 
         except SignfaceError as error:
             failed.append(Outcome(name, FAILED, message=f"{entry.path}: {error}"))
             continue
-        jobs[name] = Job(_absolute(entry), folder, output, own, classifier, model, code)
+        jobs[name] = Job(_absolute(entry), folder, output, own, classifier, model, code, writing, written)
     return list(jobs.values()), failed
+
+
+def _writing(options: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
+    """The options with an absolute template, which workers elsewhere find, and the SHA-256 of all they say."""
+    absolute, digest = dict(options), hashlib.sha256()
+    template = options.get("template")
+    if template is not None:
+        absolute["template"] = Path(os.path.abspath(template))
+        try:
+            digest.update(absolute["template"].read_bytes())
+        except OSError as error:
+            raise SignfaceError(f"cannot be read ({error.strerror})", file=template) from error
+    digest.update(repr(sorted((key, value) for key, value in options.items() if key != "template")).encode())
+    return absolute, digest.hexdigest()
 
 
 def annotate_job(job: Job) -> Outcome:
@@ -264,7 +290,13 @@ def _annotate(job: Job, notes: list[str]) -> tuple[str, bool, str]:
         return CORRECTED, solved, f"{job.eaf}: was worked in and stays as it is"
     annotation = annotate(descriptors, model=_model(job.classifier, job.model))
     write_annotation(
-        annotation, job.eaf, signer=job.entry.signer, video=job.entry.video, date=DATE, properties={"file": origin.file}
+        annotation,
+        job.eaf,
+        signer=job.entry.signer,
+        video=job.entry.video,
+        date=DATE,
+        properties={"file": origin.file},
+        **job.writing,
     )
     found = summarise(annotation)
     _write_log(job, [*notes, found, f"written to {job.eaf}", ending])
@@ -320,7 +352,7 @@ def _names_of(job: Job) -> list[str]:
 def _annotation_key(job: Job, descriptors: str) -> str:
     """SHA-256 of all that an annotation depends on, from the key of the descriptors."""
     video = "" if job.entry.video is None else os.path.relpath(job.entry.video, job.output)
-    parts = [descriptors, job.model, job.code, job.entry.signer, video]
+    parts = [descriptors, job.model, job.code, job.written, job.entry.signer, video]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
