@@ -38,7 +38,6 @@ import numpy as np
 from signface.solve.bounds import (
     AT_REST,
     KNEE,
-    RELEASE,
     SMOOTHING,
     holding_curvature,
     holding_energy,
@@ -46,6 +45,8 @@ from signface.solve.bounds import (
     released,
 )
 
+#: Rounds in which markers that stand too far off are drawn nearer. More change nothing that matters.
+SLIP_ROUNDS = 2
 #: Steps after which a frame is left to the damped method.
 QUICK_STEPS = 60
 #: Steps after which every other one is halved.
@@ -60,8 +61,8 @@ RENEW = 256
 CANCELLED = 1e-4
 #: Up to this distance outside 0 to 1 the exponential is summed as a series, without a call.
 NEAR = SMOOTHING / 4
-#: Frames taken together where matrices are multiplied, so that a row of the matrix is read once for four of them.
-BLOCK = 32
+#: Frames taken together: what they need then stays in the processor's cache from one loop to the next.
+BLOCK = 256
 #: Weights are padded to a multiple of this: two vector registers of eight.
 PADDING = 16
 #: Frames under which a second thread costs more than it gives.
@@ -82,10 +83,10 @@ def _compiled(function: Callable) -> Callable:
 
 
 @_compiled
-def _products(rows, begin, end, matrix, out):
-    """`out[f - begin, i] = rows[f] . matrix[i]` for the rows from `begin` to `end`, four by two at a time."""
-    for f0 in range(begin, end, 4):
-        f1, f2, f3 = min(f0 + 1, end - 1), min(f0 + 2, end - 1), min(f0 + 3, end - 1)
+def _products(rows, matrix, out):
+    """`out[f, i] = rows[f] . matrix[i]`, four rows by two at a time."""
+    for f0 in range(0, len(rows), 4):
+        f1, f2, f3 = min(f0 + 1, len(rows) - 1), min(f0 + 2, len(rows) - 1), min(f0 + 3, len(rows) - 1)
         for i in range(0, len(matrix), 2):
             s00 = s01 = s10 = s11 = s20 = s21 = s30 = s31 = 0.0
             for j in range(matrix.shape[1]):
@@ -98,10 +99,8 @@ def _products(rows, begin, end, matrix, out):
                 s21 += rows[f2, j] * v
                 s30 += rows[f3, j] * u
                 s31 += rows[f3, j] * v
-            out[f0 - begin, i], out[f0 - begin, i + 1] = s00, s01
-            out[f1 - begin, i], out[f1 - begin, i + 1] = s10, s11
-            out[f2 - begin, i], out[f2 - begin, i + 1] = s20, s21
-            out[f3 - begin, i], out[f3 - begin, i + 1] = s30, s31
+            out[f0, i], out[f0, i + 1], out[f1, i], out[f1, i + 1] = s00, s01, s10, s11
+            out[f2, i], out[f2, i + 1], out[f3, i], out[f3, i + 1] = s20, s21, s30, s31
 
 
 @_compiled
@@ -137,12 +136,12 @@ def _correct(inverse, i, change, row):
 
 
 @_compiled
-def _follow(right, many, quad, free, stiffness, pull, tolerance, inverse, state, which, age, solved, steps):
-    """Solve the frames of a block, one after the other: `2 A c - right[k] + H'(c) = 0` for `k < many`.
+def _follow(right, quad, free, stiffness, pull, tolerance, inverse, state, which, age, solved, steps):
+    """Solve frames one after the other: `2 A c - right[f] + H'(c) = 0`.
 
-    `state` and `inverse` carry over what the next block starts from: the weights in `state[0]`, the slopes taken, and
+    `state` and `inverse` carry over what the next call starts from: the weights in `state[0]`, the slopes taken, and
     the inverse for those; `age` is for how many frames it has been corrected, and is returned. `steps` counts a frame's
-    steps, or becomes -2 where they did not lead to the optimum. Frames with a negative count are left out.
+    steps, or becomes -1 where `right` has a NaN, -2 where no optimum was reached; a frame that is -2 is left out.
     """
     n = len(quad)
     knee = KNEE if pull > 0.0 else 0.0
@@ -152,8 +151,15 @@ def _follow(right, many, quad, free, stiffness, pull, tolerance, inverse, state,
     # slopes and curvatures there. `balance` is 2 A weight.
     weight, curve, taken, true, bend = state[0], state[1], state[2], state[3], state[4]
     balance, error, move = state[5], state[6], state[7]
-    for frame in range(many):
+    for frame in range(len(right)):
+        total = 0.0
+        for i in range(n):
+            total += right[frame, i]
+        if not isfinite(total):
+            steps[frame] = -1
         if steps[frame] < 0:
+            for i in range(n):
+                solved[frame, i] = 0.0
             continue
         steps[frame] = -2
         renew = age >= RENEW
@@ -269,45 +275,20 @@ def _follow(right, many, quad, free, stiffness, pull, tolerance, inverse, state,
 
 
 @_compiled
-def _solve_frames(
-    rows, project, quad, free, bases, places, count, stiffness, pull, turns, tolerance,
-    inverse, state, which, ages, right, solved, placed, done, weights, residual, steps,
-):  # fmt: skip
-    """Solve consecutive frames; see `Problem.solve`. `steps` becomes -1 in frames of which `rows` has a NaN.
-
-    Of two turns, the second lets go of the weights that the first found active (`signface.solve.bounds.released`). They
-    take turns block by block, and each goes on from its own last frame.
-    """
-    n = len(quad)
-    for begin in range(0, len(rows), len(right)):
-        end = min(begin + len(right), len(rows))
-        _products(rows, begin, end, project, right)
-        for frame in range(end - begin):
-            total = 0.0
-            for i in range(n):
-                total += right[frame, i]
-                solved[frame, i] = 0.0
-            done[frame] = 0 if isfinite(total) else -1
-        for turn in range(turns):
-            if turn == 1:
-                for frame in range(end - begin):
-                    for i in range(n):
-                        share = (solved[frame, i] - RELEASE[0]) / (RELEASE[1] - RELEASE[0])
-                        right[frame, i] += pull * max(0.0, min(share, 1.0))
-            ages[turn] = _follow(
-                right, end - begin, quad, free, stiffness, pull, tolerance,
-                inverse[turn], state[turn], which, ages[turn], solved, done,
-            )  # fmt: skip
-        _products(solved, 0, end - begin, bases, placed)
-        for frame in range(end - begin):
-            total = 0.0
-            for j in range(rows.shape[1]):
-                apart = placed[frame, j] - rows[begin + frame, j]
-                total += apart * apart
-            residual[begin + frame] = sqrt(total / count)
-            steps[begin + frame] = done[frame]
-            for i in range(len(places)):
-                weights[begin + frame, places[i]] = solved[frame, i]
+def _finish(rows, placed, solved, places, count, weights, residual, farthest):
+    """Put weights in their places and measure how far they leave the markers: in root mean square, and at most."""
+    for frame in range(len(rows)):
+        total, most = 0.0, 0.0
+        for j in range(0, rows.shape[1], 3):
+            x = placed[frame, j] - rows[frame, j]
+            y = placed[frame, j + 1] - rows[frame, j + 1]
+            z = placed[frame, j + 2] - rows[frame, j + 2]
+            squared = x * x + y * y + z * z
+            total += squared
+            most = max(most, squared)
+        residual[frame], farthest[frame] = sqrt(total / count), sqrt(most)
+        for i in range(len(places)):
+            weights[frame, places[i]] = solved[frame, i]
 
 
 class Problem:
@@ -342,7 +323,7 @@ class Problem:
         places: np.ndarray,
         width: int,
     ) -> None:
-        self.normal, self.project, self.count, self.width = normal, project, count, width
+        self.normal, self.project, self.bases, self.count, self.width = normal, project, bases, count, width
         self.places = np.ascontiguousarray(places, dtype=np.int64)
         n = len(normal)
         padded = n + -n % PADDING
@@ -361,32 +342,50 @@ class Problem:
         pull: float,
         release: bool,
         tolerance: float,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Weights, residuals and numbers of steps of consecutive frames, in this thread.
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Weights, residuals, farthest markers and numbers of steps of consecutive frames, in this thread.
 
         `stiffness` is the slope unit of the bounds (weight * AT_REST / SMOOTHING), `pull` the slope of the rest energy.
         The number of steps is -1 in frames with a NaN, -2 in those not solved.
         """
-        padded, turns = len(self._quad), 1 + release
-        state = np.zeros((turns, 8, padded))
+        padded, frames = len(self._quad), len(rows)
+        weights, residual, farthest = np.zeros((frames, self.width)), np.empty(frames), np.empty(frames)
+        steps = np.zeros(frames, dtype=np.int64)
+        which = np.empty(padded, dtype=np.int64)
+        room = min(frames, BLOCK)
+        right, solved, placed = np.empty((room, padded)), np.empty((room, padded)), np.empty((room, len(self._bases)))
+        # The first and the second solve each go on from their own last frame.
+        inverses, states, ages = np.empty((2, padded, padded)), np.zeros((2, 8, padded)), [RENEW, RENEW]
         if first is not None:
-            state[:, 0, : len(first)] = first
-        weights, residual = np.zeros((len(rows), self.width)), np.empty(len(rows))
-        steps = np.empty(len(rows), dtype=np.int64)
-        _solve_frames(
-            rows, self._project, self._quad, self._free, self._bases, self.places, float(self.count),
-            stiffness, pull, turns, tolerance,
-            np.empty((turns, padded, padded)), state, np.empty(padded, dtype=np.int64),
-            np.full(turns, RENEW), np.empty((BLOCK, padded)), np.empty((BLOCK, padded)),
-            np.empty((BLOCK, len(self._bases))), np.empty(BLOCK, dtype=np.int64),
-            weights, residual, steps,
-        )  # fmt: skip
-        return weights, residual, steps
+            states[:, 0, : len(first)] = first
+        for begin in range(0, frames, BLOCK):
+            some = slice(begin, min(begin + BLOCK, frames))
+            own, done = rows[some], steps[some]
+            right, solved, placed = right[: len(own)], solved[: len(own)], placed[: len(own)]
+            _products(own, self._project, right)
+            for turn in range(1 + release):
+                if turn == 1:
+                    right += pull * released(solved)
+                ages[turn] = _follow(
+                    right, self._quad, self._free, stiffness, pull, tolerance,
+                    inverses[turn], states[turn], which, ages[turn], solved, done,
+                )  # fmt: skip
+            _products(solved, self._bases, placed)
+            _finish(own, placed, solved, self.places, float(self.count), weights[some], residual[some], farthest[some])
+        return weights, residual, farthest, steps
 
-    def residual(self, weights: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """(F,) root mean square distance between the given and the solved markers for (F, n) weights."""
-        apart = weights @ self._bases[: rows.shape[1], : weights.shape[1]].T - rows
-        return np.sqrt(np.einsum("fk,fk->f", apart, apart) / self.count)
+    def distances(self, weights: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Distances between given and solved markers for (F, width) weights: (F,) root mean square, (F,) largest."""
+        apart = (weights[:, self.places] @ self.bases.T - rows).reshape(len(rows), -1, 3)
+        squared = np.square(apart).sum(axis=2)
+        return np.sqrt(squared.sum(axis=1) / self.count), np.sqrt(squared.max(axis=1))
+
+    def drawn(self, weights: np.ndarray, rows: np.ndarray, reach: float) -> np.ndarray:
+        """(F, k) marker coordinates, those further than `reach` from where weights put them drawn as near as that."""
+        placed = weights[:, self.places] @ self.bases.T
+        apart = (rows - placed).reshape(len(rows), -1, 3)
+        distance = np.sqrt(np.square(apart).sum(axis=2, keepdims=True))
+        return placed + (apart * (reach / np.maximum(distance, reach))).reshape(len(rows), -1)
 
 
 def minimise(
@@ -397,10 +396,14 @@ def minimise(
     sparsity: float,
     tolerance: float,
     release: bool = False,
+    reach: float = inf,
     first: np.ndarray | None = None,
     threads: int | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Weights at the optimum of every frame, and how far from the markers they leave the face.
+
+    Frames in which markers stand too far off are solved again with those drawn nearer. These are Huber's modified
+    residuals (P. J. Huber, Robust Statistics, 1981, 7.8): the least squares of each round have the same matrix.
 
     Parameters
     ----------
@@ -415,6 +418,8 @@ def minimise(
         The length of the gradient at which a frame counts as solved.
     release : bool
         Solve a second time without the rest energy of clearly active weights.
+    reach : float
+        Distance from the solved face beyond which a marker pulls no harder.
     first : (n,) array, optional
         Weights to start frame 0 from.
     threads : int, optional
@@ -428,12 +433,36 @@ def minimise(
         Root mean square distance of the markers, NaN in the frames not solved.
     """
     rows = np.require(rows, np.float64, ["C", "W"])
-    how = (bounds * AT_REST / SMOOTHING, bounds * sparsity, release, tolerance)
     if threads is None:
         threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    how = (bounds, sparsity, release, tolerance)
+    weights, residual, farthest = _optimum(rows, problem, first, threads, *how)
+    frames = np.arange(len(rows))
+    for _ in range(SLIP_ROUNDS):
+        frames = frames[farthest[frames] > reach]
+        if not len(frames):
+            break
+        nearer = problem.drawn(weights[frames], rows[frames], reach)
+        weights[frames] = _optimum(nearer, problem, first, threads, *how)[0]
+        residual[frames], farthest[frames] = problem.distances(weights[frames], rows[frames])
+    return weights, residual
+
+
+def _optimum(
+    rows: np.ndarray,
+    problem: Problem,
+    first: np.ndarray | None,
+    threads: int,
+    bounds: float,
+    sparsity: float,
+    release: bool,
+    tolerance: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Weights, residuals and farthest markers of all frames, each thread with a span of them."""
+    how = (bounds * AT_REST / SMOOTHING, bounds * sparsity, release, tolerance)
     spans = min(threads, max(1, len(rows) // FRAMES_PER_THREAD))
     if spans == 1:
-        weights, residual, steps = problem.solve(rows, first, *how)
+        weights, residual, farthest, steps = problem.solve(rows, first, *how)
     else:
         cuts = np.linspace(0, len(rows), spans + 1).astype(int)
         with ThreadPoolExecutor(spans) as pool:
@@ -442,8 +471,7 @@ def minimise(
                 cuts[:-1],
                 cuts[1:],
             )
-            weights, residual, steps = (np.concatenate(part) for part in zip(*parts))
-    residual[steps == -1] = np.nan
+            weights, residual, farthest, steps = (np.concatenate(part) for part in zip(*parts))
     left = np.flatnonzero(steps == -2)
     if len(left):
         right = rows[left] @ problem.project.T
@@ -452,8 +480,8 @@ def minimise(
             right = right + 0.5 * bounds * sparsity * released(own)
             own = minimise_damped(problem.normal, right, bounds=bounds, sparsity=sparsity, tolerance=tolerance)
         weights[np.ix_(left, problem.places)] = own
-        residual[left] = problem.residual(own, rows[left])
-    return weights, residual
+        residual[left], farthest[left] = problem.distances(weights[left], rows[left])
+    return weights, residual, farthest
 
 
 def minimise_damped(

@@ -27,8 +27,6 @@ shrinks what it holds, so that a second solve, as convex, lets go of the weights
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from signface.errors import SignfaceError
@@ -49,11 +47,9 @@ SPARSITY = 0.006
 #: Variance of the head's residual shift (and of its turn, at the markers' distance from their centre) beside that of a
 #: marker's coordinate.
 HEAD_SLACK = 0.3
-#: A marker further from the solved face than this share of a typical base's root mean square displacement (1.3 mm on the
-#: default face) pulls no harder than one at that distance.
+#: A marker further from the solved face than this share of a typical base's root mean square displacement pulls no
+#: harder than one at that distance (1.3 mm on the default face).
 SLIP = 0.4
-#: Rounds in which markers that stand too far off are drawn nearer. More change nothing that matters.
-SLIP_ROUNDS = 2
 #: The length of the gradient at which a frame counts as solved. Energies are of the order of 1.
 GRADIENT = 1e-9
 #: Frames solved at a time, so that a long take needs little memory.
@@ -125,7 +121,7 @@ class ThinShellSolver:
         self.alpha, self.sparsity, self.threads = float(alpha), float(sparsity), threads
         self.release = release and self.sparsity > 0.0 and self.alpha < 1.0
         self.markers = MarkerBases(face, layout, skin=self.alpha > 0.0, signer_bases=signer_bases)
-        self._reach = slip * np.sqrt(self.markers.scale / self.markers.n_markers)
+        self._reach = slip * np.sqrt(self.markers.scale / self.markers.n_markers) if slip > 0.0 else np.inf
         observed = self.markers.observed
         shell = np.zeros((int(observed.sum()),) * 2)
         for part in thin_shell_matrices(face):
@@ -200,45 +196,14 @@ class ThinShellSolver:
 
     def _solve_chunk(self, displacements: np.ndarray) -> Solution:
         rows = self.markers.rows(displacements)
-        weights, residual = self._optimum(rows)
-        self._draw_nearer(rows, weights, residual, self._optimum)
-        return Solution(weights, residual)
-
-    def _optimum(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         weights, residual = self._minimise(rows, self._whole)
         left = np.flatnonzero(np.isnan(residual))
         if len(left):
-            some, present = self.markers.checked(rows[left].reshape(len(left), -1, 3))
+            some, present = self.markers.checked(displacements[left])
             weights[left] = np.nan
             for pattern, frames in presence_patterns(present):
                 weights[left[frames]], residual[left[frames]] = self._minimise(some[frames], self._problem(pattern))
-        return weights, residual
-
-    def _draw_nearer(
-        self,
-        rows: np.ndarray,
-        weights: np.ndarray,
-        residual: np.ndarray,
-        solve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
-    ) -> None:
-        """Solve frames again in which markers stand too far off, with those drawn nearer; in place.
-
-        These are Huber's modified residuals (P. J. Huber, Robust Statistics, 1981, 7.8): the least squares of each
-        round have the same matrix, so that nothing is factorised anew for a frame's own marker weights.
-        """
-        frames = np.arange(len(rows))
-        for _ in range(SLIP_ROUNDS if self._reach > 0.0 else 0):
-            placed = weights[frames] @ self.markers.matrix.T
-            apart = (rows[frames] - placed).reshape(len(frames), -1, 3)
-            distance = np.sqrt(np.einsum("fpd,fpd->fp", apart, apart))
-            far = (distance > self._reach).any(axis=1)
-            if not far.any():
-                break
-            frames, apart, distance = frames[far], apart[far], distance[far]
-            apart *= np.minimum(1.0, self._reach / np.maximum(distance, self._reach))[:, :, None]
-            weights[frames] = solve(placed[far] + apart.reshape(len(frames), -1))[0]
-            placed = weights[frames] @ self.markers.matrix.T
-            residual[frames] = np.sqrt(3.0 * np.nanmean((rows[frames] - placed) ** 2, axis=1))
+        return Solution(weights, residual)
 
     def _minimise(
         self, rows: np.ndarray, problem: Problem, first: np.ndarray | None = None
@@ -250,6 +215,7 @@ class ThinShellSolver:
             sparsity=self.sparsity,
             tolerance=GRADIENT,
             release=self.release,
+            reach=self._reach,
             first=first,
             threads=self.threads,
         )
@@ -274,13 +240,6 @@ class ThinShellSolver:
             self._pattern, self._pushed = present[0], self._problem(present[0])
         weights, residual = self._minimise(rows, self._pushed, self._last)
         self._last = weights[0, self._whole.places]
-        missing = np.repeat(~present[0], 3)
-        self._draw_nearer(
-            np.where(missing, np.nan, rows),
-            weights,
-            residual,
-            lambda nearer: self._minimise(np.where(missing, 0.0, nearer), self._pushed, self._last),
-        )
         return Solution(weights, residual)
 
     def uncertainty(self, weights: np.ndarray, marker_error: float) -> np.ndarray:
