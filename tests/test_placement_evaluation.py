@@ -14,9 +14,9 @@ from signface.placement.actors import Virtual, draw_actors
 from signface.placement.empirical import place_layout
 from signface.placement.evaluation import error_map, evaluate_layout, skin_metric
 from signface.placement.findings import against, flattening
-from signface.placement.gaussian_process import GaussianProcess, SparseOnlineGaussianProcess
 from signface.placement.layout_study import Plan, load_cell, save_cell
 from signface.render.layout_sheet import distances, numbering
+from signface.solve.gaussian_process import GaussianProcess, SparseOnlineGaussianProcess
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,6 @@ What is there to compare:
 What it is compared on:
 
 - `actors`: heads of people who do not exist, their range of motion and their takes.
-- `gaussian_process`: mappings learnt from markers to weights.
 - `evaluation`: the error of a layout, mapping by mapping.
 - `layout_study`: all of it, cell by cell, so that it can be resumed.
 """

@@ -20,8 +20,8 @@ from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.placement.actors import Actor, Virtual
-from signface.placement.gaussian_process import GaussianProcess, SparseOnlineGaussianProcess
 from signface.solve.adaptation import MorphologicalAdaptation
+from signface.solve.gaussian_process import GaussianProcess, SparseOnlineGaussianProcess
 from signface.solve.methods import make_solver
 
 #: The mappings, and how they are called in reports.

@@ -16,12 +16,11 @@ import numpy as np
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
+from signface.solve import gaussian_process
 from signface.solve.solver import MarkerBases, Solution, presence_patterns
 
 #: Pairs made where none are given, and the jitter of their markers beside the typical displacement.
 PAIRS, JITTER = 800, 0.02
-#: Pairs from which a Gaussian process finds the sizes of its kernels.
-FEW = 100
 
 
 def example_pairs(
@@ -107,79 +106,20 @@ class RbfNetwork(_Learnt):
 
 
 class GaussianProcess(_Learnt):
-    """Gaussian process regression with a linear and a Gaussian kernel, its sizes found by maximum likelihood."""
+    """Gaussian process regression, see `signface.solve.gaussian_process`."""
 
     def _learn(self, inputs: np.ndarray, weights: np.ndarray) -> None:
-        from sklearn.gaussian_process import GaussianProcessRegressor
-        from sklearn.gaussian_process.kernels import RBF, ConstantKernel, DotProduct, WhiteKernel
-
-        kernel = (
-            ConstantKernel(0.1) * RBF(2.0 * _median_distance(inputs), (1.0, 1e5))
-            + ConstantKernel(0.01, (1e-8, 1e3)) * DotProduct(0.0, "fixed")
-            + WhiteKernel(1e-2, (1e-6, 1.0))
-        )
-        few = GaussianProcessRegressor(kernel, random_state=0).fit(inputs[:FEW], weights[:FEW])
-        self._process = GaussianProcessRegressor(few.kernel_, optimizer=None).fit(inputs, weights)
+        self._process = gaussian_process.GaussianProcess().fit(inputs, weights)
 
     def _predict(self, inputs: np.ndarray) -> np.ndarray:
         return self._process.predict(inputs)
 
 
 class SparseOnlineGaussianProcess(_Learnt):
-    """A Gaussian process that takes one pair at a time and keeps at most `CAPACITY` of them.
-
-    The kernel is the sum of a linear and a Gaussian one. A pair that those kept explain only updates them; one that
-    is new is kept, and the least telling one is let go.
-    """
-
-    CAPACITY = 150
-    NOISE = 1e-2
-    NOVELTY = 1e-4
+    """A Gaussian process that takes one pair at a time and keeps the most telling of them."""
 
     def _learn(self, inputs: np.ndarray, weights: np.ndarray) -> None:
-        self._width = 2.0 * _median_distance(inputs)
-        self._kept = np.empty((0, inputs.shape[1]))
-        self._alpha = np.empty((0, weights.shape[1]))
-        self._c, self._q = np.empty((0, 0)), np.empty((0, 0))
-        for point, target in zip(inputs, weights):
-            self.learn_one(point, target)
-
-    def _kernel(self, left: np.ndarray, right: np.ndarray) -> np.ndarray:
-        return 0.1 * _gaussian(left, right, self._width) + 0.01 * left @ right.T
-
-    def learn_one(self, point: np.ndarray, target: np.ndarray) -> None:
-        """Take one pair: (3P,) scaled displacements and (N,) weights."""
-        across = self._kernel(self._kept, point[None])[:, 0]
-        own = float(self._kernel(point[None], point[None])[0, 0])
-        spread = own + across @ self._c @ across + self.NOISE
-        error, change = (target - across @ self._alpha) / spread, -1.0 / spread
-        projection = self._q @ across
-        novelty = own - across @ projection
-        if novelty < self.NOVELTY:
-            step = self._c @ across + projection
-        else:
-            step = np.append(self._c @ across, 1.0)
-            beyond = np.append(projection, -1.0)
-            self._kept = np.vstack([self._kept, point])
-            self._alpha = np.vstack([self._alpha, np.zeros((1, len(target)))])
-            self._c = np.pad(self._c, ((0, 1), (0, 1)))
-            self._q = np.pad(self._q, ((0, 1), (0, 1))) + np.outer(beyond, beyond) / novelty
-        self._alpha = self._alpha + np.outer(step, error)
-        self._c = self._c + change * np.outer(step, step)
-        if len(self._kept) > self.CAPACITY:
-            score = (self._alpha**2).sum(axis=1) / (np.diag(self._q) + np.diag(self._c))
-            self._let_go(int(np.argmin(score)))
-
-    def _let_go(self, one: int) -> None:
-        """Remove a kept pair so that the process changes least (Csato and Opper, eq. 24 to 26)."""
-        rest = np.delete(np.arange(len(self._kept)), one)
-        q, c = self._q[one, one], self._c[one, one]
-        across_q, across_c = self._q[rest, one], self._c[rest, one]
-        self._alpha = self._alpha[rest] - np.outer(across_q, self._alpha[one]) / q
-        mixed = np.outer(across_q, across_c)
-        self._c = self._c[np.ix_(rest, rest)] + c * np.outer(across_q, across_q) / q**2 - (mixed + mixed.T) / q
-        self._q = self._q[np.ix_(rest, rest)] - np.outer(across_q, across_q) / q
-        self._kept = self._kept[rest]
+        self._process = gaussian_process.SparseOnlineGaussianProcess().fit(inputs, weights)
 
     def _predict(self, inputs: np.ndarray) -> np.ndarray:
-        return self._kernel(inputs, self._kept) @ self._alpha
+        return self._process.predict(inputs)
