@@ -3,8 +3,9 @@
 - `GaussianProcess`: the exact posterior mean.
 - `SparseOnlineGaussianProcess`: the same seen frame by frame, on a small set of basis vectors.
 
-Both are scikit-learn estimators and share one kernel over all outputs: a squared exponential whose length and noise are those of the greatest marginal
-likelihood on a grid (C. Rasmussen and C. Williams, Gaussian Processes for Machine Learning, 2006, 5.4).
+Both are estimators in scikit-learn's manner and share one kernel over all outputs: a squared exponential whose length
+and noise are those of the greatest marginal likelihood on a grid (C. Rasmussen and C. Williams, Gaussian Processes for
+Machine Learning, 2006, 5.4).
 """
 
 from __future__ import annotations
