@@ -323,7 +323,7 @@ class Problem:
         places: np.ndarray,
         width: int,
     ) -> None:
-        self.normal, self.project, self.bases, self.count, self.width = normal, project, bases, count, width
+        self.normal, self.project, self.count, self.width = normal, project, count, width
         self.places = np.ascontiguousarray(places, dtype=np.int64)
         n = len(normal)
         padded = n + -n % PADDING
@@ -376,16 +376,21 @@ class Problem:
 
     def distances(self, weights: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Distances between given and solved markers for (F, width) weights: (F,) root mean square, (F,) largest."""
-        apart = (weights[:, self.places] @ self.bases.T - rows).reshape(len(rows), -1, 3)
-        squared = np.square(apart).sum(axis=2)
+        squared = np.square(self._apart(weights, rows)).sum(axis=2)
         return np.sqrt(squared.sum(axis=1) / self.count), np.sqrt(squared.max(axis=1))
 
     def drawn(self, weights: np.ndarray, rows: np.ndarray, reach: float) -> np.ndarray:
         """(F, k) marker coordinates, those further than `reach` from where weights put them drawn as near as that."""
-        placed = weights[:, self.places] @ self.bases.T
-        apart = (rows - placed).reshape(len(rows), -1, 3)
+        apart = self._apart(weights, rows)
         distance = np.sqrt(np.square(apart).sum(axis=2, keepdims=True))
-        return placed + (apart * (reach / np.maximum(distance, reach))).reshape(len(rows), -1)
+        return rows - (apart * (1.0 - reach / np.maximum(distance, reach))).reshape(len(rows), -1)
+
+    def _apart(self, weights: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """(F, P, 3) from the solved markers to the given ones."""
+        own, placed = np.zeros((len(rows), len(self._quad))), np.empty((len(rows), len(self._bases)))
+        own[:, : len(self.places)] = weights[:, self.places]
+        _products(own, self._bases, placed)
+        return (rows - placed[:, : rows.shape[1]]).reshape(len(rows), -1, 3)
 
 
 def minimise(
