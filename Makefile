@@ -2,10 +2,11 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
+CLASSIFIERS := knn1,knn3,svm-linear,svm-rbf,forest,net-hsmm
 INSTALLED := $(VENV)/.installed
 TESTING := $(VENV)/.testing
 
-.PHONY: help demo test check bench mini clean
+.PHONY: help demo test check bench mini example-report clean
 
 help:
 	@echo "make demo   install signface in $(VENV) and annotate the takes that ship with it"
@@ -35,6 +36,10 @@ check: $(TESTING)
 
 test: check
 	$(BIN)/python -m pytest -n auto
+
+example-report: $(INSTALLED)
+	test -d corpora/example || $(BIN)/signface synth corpora/example --signers 3 --seed 20261122
+	$(BIN)/signface evaluate corpora/example -o reports/example --classifiers $(CLASSIFIERS)
 
 bench: $(TESTING)
 	$(BIN)/python -m benchmarks.solver

@@ -156,6 +156,8 @@ def _segmentation(evaluated: Evaluated) -> tuple[list[str], list[dict[str, Any]]
                 for column in table.columns
                 if column.startswith("boundary")
             },
+            "over-segmentation": "over-segmen\N{SOFT HYPHEN}tation",
+            "under-segmentation": "under-segmen\N{SOFT HYPHEN}tation",
             "segments, reference": "reference",
             "segments, found": "found",
         }
