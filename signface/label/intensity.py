@@ -1,7 +1,7 @@
 """Intensity of an expression, 1 to 3, learnt from annotations: an ordinal classification beside the label.
 
 - `OrdinalClassifier`: ordered classes by any classifier of scikit-learn that gives probabilities.
-- `IntensityClassifier`: the intensity of stable segments, from how far the face is from rest, label by label.
+- `IntensityClassifier`: the intensity of stable segments, from how far the face is from rest.
 - `train_intensity`: one trained on annotated takes, where their intensity is annotated.
 - `ordinal_metrics`: how well intensities agree.
 """
@@ -77,9 +77,8 @@ class OrdinalClassifier(ClassifierMixin, BaseEstimator):
 class IntensityClassifier(BaseEstimator):
     """The intensity of stable segments with a label.
 
-    It sees how far a segment's mean descriptor lies from rest (the norm of its weights), and that for each label on
-    its own: a strong fear moves the face less than a strong joy. The weights themselves do not help on signers who were
-    not trained on.
+    It sees how far a segment's mean descriptor lies from rest: the norm of its weights. On synthetic signers who were
+    not trained on, the weights themselves do worse, and a line for each label does no better.
 
     Parameters
     ----------
@@ -103,7 +102,7 @@ class IntensityClassifier(BaseEstimator):
             table = _with_intensity(reference)
             strength = self._strength(take, table)
             seen = np.isfinite(strength)
-            rows.append(_features(strength[seen], table["label"].to_numpy(str)[seen]))
+            rows.append(strength[seen, None])
             levels.append(table["intensity"].to_numpy(int)[seen])
         self.n_segments_ = sum(map(len, levels))
         self.classifier_ = clone(self.classifier).fit(np.concatenate(rows), np.concatenate(levels))
@@ -116,7 +115,7 @@ class IntensityClassifier(BaseEstimator):
         judged = np.isfinite(strength) & table["label"].isin(EXPRESSED).to_numpy()
         levels: list[int | None] = [None] * len(table)
         if judged.any():
-            found = self.classifier_.predict(_features(strength[judged], table["label"].to_numpy(str)[judged]))
+            found = self.classifier_.predict(strength[judged, None])
             for row, level in zip(np.flatnonzero(judged), found, strict=True):
                 levels[row] = int(level)
         return levels
@@ -198,9 +197,3 @@ def _with_intensity(reference: Segments) -> pd.DataFrame:
         return pd.DataFrame(columns=["start_s", "end_s", "label", "intensity"])
     kept = (table["kind"] == "stable") & table["intensity"].notna() & table["label"].isin(EXPRESSED)
     return table.loc[kept, ["start_s", "end_s", "label", "intensity"]]
-
-
-def _features(strength: np.ndarray, labels: np.ndarray) -> np.ndarray:
-    """(S, 1 + 2 L) strength, which label it is, and the strength of that label."""
-    which = (labels[:, None] == np.array(EXPRESSED)).astype(float)
-    return np.column_stack([strength, which, strength[:, None] * which])
