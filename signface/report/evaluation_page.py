@@ -358,11 +358,14 @@ def _importance(evaluated: Evaluated) -> tuple[list[str], list[dict[str, Any]]]:
 
 
 def _take(verdict: TakeVerdict, figures: Mapping[str, Drawn]) -> dict[str, Any]:
-    safe = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in verdict.take)
-    figure = figures.get(f"take_{safe}")
+    from signface.report.evaluation_report import figure_name
+
+    name = figure_name(verdict.take)
+    figure = figures.get(name)
     known = verdict.agreement == verdict.agreement
     return {
         "take": verdict.take,
+        "name": name,
         "signer": verdict.signer,
         "kind": verdict.kind,
         "agreement": words.percent(verdict.agreement) if known else "nothing annotated",

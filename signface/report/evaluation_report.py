@@ -8,11 +8,13 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from zlib import crc32
 
 import numpy as np
 import pandas as pd
@@ -293,6 +295,18 @@ def _example(evaluated: Evaluated, verdict: TakeVerdict) -> Example:
     return next(example for example in evaluated.examples if example.take == verdict.take)
 
 
+def figure_name(take: str) -> str:
+    """The name of a take's figure: a file's name on every system, and another one for every take.
+
+    Examples
+    --------
+    >>> figure_name("S1_EU_07"), figure_name("S1/laugh")
+    ('take_S1_EU_07', 'take_S1_laugh_a2d286d2')
+    """
+    plain = re.sub(r"[^A-Za-z0-9_-]", "_", take)
+    return f"take_{plain}" if plain == take else f"take_{plain}_{crc32(take.encode()):08x}"
+
+
 def _take(evaluated: Evaluated, verdict: TakeVerdict) -> Drawn:
     """The timeline of a take: a row for each protocol, and the reference."""
     example = _example(evaluated, verdict)
@@ -309,9 +323,8 @@ def _take(evaluated: Evaluated, verdict: TakeVerdict) -> Drawn:
         first: np.delete(found, [j for _, j in pairs]),
     }
     rows["reference"] = example.reference
-    safe = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in verdict.take)
     return Drawn(
-        f"take_{safe}",
+        figure_name(verdict.take),
         figures.draw_take(example.descriptors, rows, marks=marks),
         f"Timeline of {verdict.take}: energies above, the segments of {evaluated.best} and of the reference below. "
         + ("; ".join(verdict.reasons) or "Nothing is wrong."),
