@@ -103,8 +103,8 @@ class CleanRecording:
         step = max(1, -(-self.n_frames // most))
         parts = []
         for begin, end in progress(pieces(self.n_frames, piece), "cleaning"):
-            own = self.frames(begin, end)
-            parts.append(own[-begin % step :: step])
+            own = self.frames(begin, end)[-begin % step :: step]
+            parts.append(own if step == 1 else own.copy())  # a part of an array would keep all of it
         return Take(
             np.concatenate(parts) if len(parts) > 1 else parts[0],
             self.labels,

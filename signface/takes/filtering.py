@@ -87,7 +87,7 @@ def _butterworth(signals: np.ndarray, rate: float, cutoff_hz: float) -> np.ndarr
     from signface.takes.biquad import forward_and_backward
 
     b, a = _butterworth_coefficients(rate, cutoff_hz)
-    pad = min(len(signals) - 1, int(np.ceil(3 * rate / cutoff_hz)))
+    pad = min(len(signals) - 1, _forgetting(a))  # what the filter starts from does not show then
     longer = np.concatenate(
         [2 * signals[0] - signals[pad:0:-1], signals, 2 * signals[-1] - signals[-2 : -2 - pad : -1]]
     )
@@ -105,8 +105,12 @@ def reach(rate: float, cutoff_hz: float, method: str) -> int | None:
         return 0
     if method != "butterworth":
         return None
-    _, a = _butterworth_coefficients(rate, cutoff_hz)
-    return int(np.ceil(np.log(FORGOTTEN) / np.log(np.abs(np.roots(a)).max())))
+    return _forgetting(_butterworth_coefficients(rate, cutoff_hz)[1])
+
+
+def _forgetting(denominator: np.ndarray) -> int:
+    """After how many frames the filter has forgotten one."""
+    return int(np.ceil(np.log(FORGOTTEN) / np.log(np.abs(np.roots(denominator)).max())))
 
 
 def lowpass(take: Take, *, cutoff_hz: float = CUTOFF_HZ, method: str = "butterworth") -> Take:

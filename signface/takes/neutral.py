@@ -107,7 +107,9 @@ def neutral_candidates(
     kept: list[np.ndarray] = []
     for begin, end in sorted(motion.stretches, key=lambda stretch: stretch[0] - stretch[1]):
         rest = motion.poses[begin:end]
-        mean = np.nanmean(rest, axis=0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # markers that are not seen in this stretch
+            mean = np.nanmean(rest, axis=0)
         if all(np.sqrt(np.nanmean(np.sum((mean - other) ** 2, axis=1))) > SAME_POSE_MM for other in kept):
             kept.append(mean)
             times.append(float(take.time[begin + _most_typical(rest)]))
