@@ -21,7 +21,7 @@ def takes():
 
 
 def barely_trained(takes, *, seed: int = 0) -> RecurrentLabeller:
-    labeller = RecurrentLabeller(networks=1, units=8, least_steps=3, seed=seed)
+    labeller = RecurrentLabeller(networks=1, units=8, effort=6.0, seed=seed)
     return labeller.fit([e.descriptors for e in takes], [e.reference for e in takes])
 
 

@@ -30,7 +30,10 @@ def takes():
 
 @pytest.fixture(scope="module", params=list(SEQUENCE_NAMES))
 def model(request, takes):
-    return train_model([e for e in takes if e.signer == "S1"], classifier=request.param)
+    quick = {"gru": {"networks": 1}}
+    return train_model(
+        [e for e in takes if e.signer == "S1"], classifier=request.param, parameters=quick.get(request.param)
+    )
 
 
 def test_borders_and_labels_of_another_signer_are_found(model, takes):

@@ -41,7 +41,7 @@ class RecurrentLabeller(TakeLabeller):
     the state of each frame (a label or a half of a transition) and whether a transition begins or ends there. Several
     networks, which differ by the chance of their beginning and of their training, are averaged.
 
-    While training, takes are mirrored at random, bases are made larger or smaller, and noise is added: no signer's
+    While training, takes are mirrored at random, bases are made larger or smaller, and features shifted: no signer's
     face is the last word on how large a smile is.
 
     Parameters
@@ -50,16 +50,16 @@ class RecurrentLabeller(TakeLabeller):
         How many are averaged.
     units : int
         Of each layer in each direction.
-    passes : float
-        How often each frame is trained on, on average.
-    least_steps : int
-        Steps of training on a corpus so small that the passes would take fewer.
+    effort : float
+        Steps of training on as many frames as one step takes; they grow with the square root of the frames, so that
+        a small corpus is gone through more often than a large one.
     batch, stretch : int
         Each step takes `batch` stretches of `stretch` frames, or what a small corpus has.
     rate : float
         The highest step size.
     gain, noise : float
-        How much bases are scaled (deviation of the logarithm), and how much noise is added to standardised features.
+        How much bases are scaled (deviation of the logarithm), and how far standardised features are shifted, in each
+        stretch.
     border_weight, label_weight, mark_weight : float
         Of the evidence for a transition at a frame, for a label, and for a border, against durations and orders.
     rarity : float
@@ -77,25 +77,23 @@ class RecurrentLabeller(TakeLabeller):
     def __init__(
         self,
         *,
-        networks: int = 3,
+        networks: int = 2,
         units: int = 64,
-        passes: float = 23.0,
-        least_steps: int = 40,
-        batch: int = 16,
-        stretch: int = 256,
+        effort: float = 110.0,
+        batch: int = 32,
+        stretch: int = 128,
         rate: float = 3e-3,
-        gain: float = 0.2,
-        noise: float = 0.05,
+        gain: float = 0.3,
+        noise: float = 0.2,
         border_weight: float = 0.5,
-        label_weight: float = 0.25,
+        label_weight: float = 0.2,
         mark_weight: float = 1.0,
         rarity: float = 0.6,
         seed: int = 0,
     ) -> None:
         self.networks = networks
         self.units = units
-        self.passes = passes
-        self.least_steps = least_steps
+        self.effort = effort
         self.batch = batch
         self.stretch = stretch
         self.rate = rate
@@ -122,7 +120,7 @@ class RecurrentLabeller(TakeLabeller):
         SignfaceError
             There is one label only, or no transition, or PyTorch is not installed.
         """
-        from signface.label.gru_training import Lesson, train_network
+        from signface.label.gru_training import Lesson, train_networks
 
         states = self.states_of(takes, references)
         order = {state: code for code, state in enumerate((*self.classes_, *HALVES))}
@@ -144,9 +142,7 @@ class RecurrentLabeller(TakeLabeller):
         codes = codes[codes >= 0]
         self.n_frames_ = len(codes)
         self.shares_ = np.bincount(codes, minlength=len(order)) / len(codes)
-        trained = [
-            train_network(lessons, self, self._mirrored(), self.seed + number) for number in range(self.networks)
-        ]
+        trained = train_networks(lessons, self, self._mirrored())
         self.weights_ = {name: np.stack([weights[name] for weights in trained]) for name in trained[0]}
         course = SegmentModel.learn(references, self.classes_.tolist(), self._frames.rate)
         self.stable_, self.transition_, self.after_ = course.stable, course.transition, course.after

@@ -1,7 +1,7 @@
 """How the recurrent network of `signface.label.gru` is trained, by PyTorch.
 
 - `Lesson`: what is learnt from one take.
-- `train_network`: the weights of one trained network.
+- `train_networks`, `train_network`: the weights of trained networks.
 - `make_network`, `weights_of`: the network in PyTorch, and its weights as `recurrent_outputs` takes them.
 
 One thread does all the work, so that the same takes and the same seed give the same weights.
@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from joblib import Parallel, cpu_count, delayed
 
 from signface.errors import SignfaceError
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 LAYERS = 2
 
 #: Share of units that are left out at random while training, and of features.
-DROPPED = 0.3
+DROPPED = 0.4
 DROPPED_FEATURES = 0.1
 
 #: Decay of the weights (AdamW), and the longest gradient.
@@ -36,6 +37,9 @@ GROWING = 0.15
 
 #: Weight of the borders against the states: they are rare.
 MARKS = 2.0
+
+#: Frames of a corpus from which on networks are trained in processes of their own.
+WORTH_PROCESSES = 20_000
 
 #: Code of frames that are not annotated.
 UNKNOWN = -1
@@ -103,6 +107,22 @@ def weights_of(network: Any) -> dict[str, np.ndarray]:
     return {name: np.ascontiguousarray(values) for name, values in weights.items()}
 
 
+def train_networks(
+    lessons: Sequence[Lesson], settings: RecurrentLabeller, mirrored: np.ndarray
+) -> list[dict[str, np.ndarray]]:
+    """The weights of `settings.networks` trained networks; see `train_network`.
+
+    They are trained side by side, in a process each, where there are cores and it is worth the while.
+    """
+    _torch()
+    frames = sum(len(lesson.codes) for lesson in lessons)
+    jobs = min(settings.networks, cpu_count()) if frames > WORTH_PROCESSES else 1
+    return Parallel(n_jobs=jobs)(
+        delayed(train_network)(lessons, settings, mirrored, settings.seed + number)
+        for number in range(settings.networks)
+    )
+
+
 def train_network(
     lessons: Sequence[Lesson], settings: RecurrentLabeller, mirrored: np.ndarray, seed: int
 ) -> dict[str, np.ndarray]:
@@ -126,7 +146,7 @@ def train_network(
     rng = np.random.default_rng(seed)
     batch = min(settings.batch, len(lessons))
     frames = sum(len(lesson.codes) for lesson in lessons)
-    steps = max(settings.least_steps, round(settings.passes * frames / (batch * settings.stretch)))
+    steps = max(2, round(settings.effort * (frames / (settings.batch * settings.stretch)) ** 0.5))
     states = int(max(lesson.codes.max() for lesson in lessons)) + 1
     with torch.random.fork_rng(devices=[]):
         threads = torch.get_num_threads()
@@ -180,10 +200,9 @@ def _drawn(
         gains = np.exp(rng.normal(0, settings.gain, bases) + rng.normal(0, settings.gain / 2))
         every = np.ones(part.shape[1], np.float32)
         every[:by_base] = np.tile(gains, by_base // bases)
-        shift = rng.normal(0, 2 * settings.noise, part.shape[1]).astype(np.float32)
+        shift = rng.normal(0, settings.noise, part.shape[1]).astype(np.float32)
         features[row, : last - first] = (part + zero) * every - zero + shift
         codes[row, : last - first], marks[row, : last - first] = lesson.codes[first:last], lesson.marks[first:last]
-    features += settings.noise * rng.standard_normal(features.shape, np.float32)
     return features, codes, marks
 
 
