@@ -40,6 +40,8 @@ class Descriptors:
     head : (F, 4, 4) float64 array, optional
         Pose of the head relative to its neutral frame: maps a point of the neutral head to its place in the
         recording, millimetres. The identity when unknown.
+    deviation : (F, N) float64 array, optional
+        Standard deviation of each weight; NaN where the markers say nothing. None when it was not asked for.
     name : str
         Name of the take.
     history : tuple of str
@@ -52,6 +54,7 @@ class Descriptors:
     start: float = 0.0
     residual: np.ndarray | None = None
     head: np.ndarray | None = None
+    deviation: np.ndarray | None = None
     name: str = "take"
     history: tuple[str, ...] = field(default=())
 
@@ -71,6 +74,12 @@ class Descriptors:
             raise SignfaceError(f"residual of shape {residual.shape} does not match {frames} frames")
         if head.shape != (frames, 4, 4):
             raise SignfaceError(f"head poses of shape {head.shape} do not match {frames} frames")
+        if self.deviation is not None:
+            deviation = np.array(self.deviation, dtype=np.float64)
+            if deviation.shape != weights.shape:
+                raise SignfaceError(f"deviations of shape {deviation.shape} do not match weights of {weights.shape}")
+            deviation.setflags(write=False)
+            object.__setattr__(self, "deviation", deviation)
         for array in (weights, residual, head):
             array.setflags(write=False)
         object.__setattr__(self, "weights", weights)
@@ -160,8 +169,9 @@ class WeightsWriter:
 
     def __exit__(self, kind: Any, error: Any, trace: Any) -> bool | None:
         if kind is None and not self._begun:
-            error = SignfaceError("there are no weights to write", file=self.path)
-            kind = SignfaceError
+            nothing = SignfaceError("there are no weights to write", file=self.path)
+            self._open.__exit__(SignfaceError, nothing, None)
+            raise nothing
         return self._open.__exit__(kind, error, trace)
 
     def append(self, piece: Descriptors) -> None:
