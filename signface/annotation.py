@@ -58,6 +58,7 @@ def annotate(
     method: str = "thin-shell",
     alpha: float | None = None,
     level: SignerLevel | None = None,
+    **options: Any,
 ) -> Annotation:
     """Solve, segment and label one recording (Reverdy 2019, chapters 4 and 5).
 
@@ -80,6 +81,8 @@ def annotate(
     level : SignerLevel, optional
         What a model that normalises signers normalises by (`signface.label.variants.signer_level` of takes of the
         signer); the level of this take alone when not given.
+    **options
+        More of `signface.solve.solving.solve_take`.
 
     Raises
     ------
@@ -95,7 +98,7 @@ def annotate(
     """
     from signface.label.labelling import find_segments
 
-    descriptors = describe(recording, face=face, layout=layout, neutral=neutral, method=method, alpha=alpha)
+    descriptors = describe(recording, face=face, layout=layout, neutral=neutral, method=method, alpha=alpha, **options)
     segments = find_segments(descriptors, model, level=level)
     return Annotation(descriptors, segments, model.name)
 

@@ -14,6 +14,7 @@ from signface.cli.options import (
     add_writing_arguments,
     output_files,
     read_face_and_layout,
+    solve_options,
     writing_options,
 )
 from signface.cli.progress import progress
@@ -154,9 +155,7 @@ def _describe(take: Path, arguments: argparse.Namespace, face: FaceModel, layout
         open_recording(take),
         face=face,
         layout=layout,
-        neutral=arguments.neutral,
-        method=arguments.method,
-        alpha=arguments.alpha,
+        **solve_options(arguments),
     )
 
 

@@ -19,6 +19,7 @@ COMMANDS = {
     "annotate": "annotate recordings: an ELAN file for each take",
     "take": "look at a recording: frames, rate, markers, gaps",
     "solve": "turn a recording into blendshape weights",
+    "calibrate": "learn a signer's own bases from a range-of-motion take",
     "segment": "cut weights or a recording into stable segments and transitions",
     "train": "train a classifier on a corpus",
     "evaluate": "measure segmentation and classifiers on a corpus",

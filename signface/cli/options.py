@@ -29,7 +29,7 @@ def add_face_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_solve_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add `--face`, `--layout`, `--neutral`, `--method` and `--alpha`."""
+    """Add `--face`, `--layout`, `--neutral`, and how markers become weights; see `solve_options`."""
     add_face_arguments(parser)
     parser.add_argument(
         "--neutral",
@@ -41,6 +41,27 @@ def add_solve_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--method", default="thin-shell", help="how weights are solved (default: %(default)s)")
     parser.add_argument(
         "--alpha", type=float, metavar="A", help="weight of the thin shell, 0 to 1 (default: the method's own)"
+    )
+    how = parser.add_argument_group("fine points of the solve (docs/solver.md)")
+    how.add_argument(
+        "--adaptation",
+        choices=("similarity", "rbf"),
+        default="similarity",
+        help="how displacements are carried to the avatar (default: %(default)s)",
+    )
+    how.add_argument("--sparsity", type=float, metavar="S", help="pull towards rest, 0 or more (default: 0.006)")
+    how.add_argument(
+        "--head-slack", type=float, metavar="H", help="how far head markers may creep, 0 trusts them (default: 0.3)"
+    )
+    how.add_argument(
+        "--slip",
+        type=float,
+        metavar="D",
+        help="how far off a marker counts in full, beside a typical displacement; 0 trusts all (default: 0.4)",
+    )
+    how.add_argument("--keep-creep", action="store_true", help="do not take away what the markers creep on the skin")
+    how.add_argument(
+        "--signer-bases", type=Path, metavar="FILE", help="the signer's own bases, made by signface calibrate"
     )
 
 
@@ -85,6 +106,21 @@ def writing_options(arguments: argparse.Namespace) -> dict[str, Any]:
         "doubtful_below": arguments.doubtful,
         "template": arguments.template,
         "mapping": None if arguments.mapping is None else read_mapping(arguments.mapping),
+    }
+
+
+def solve_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What `add_solve_arguments` asked for, as keywords of `signface.solve.solving.solve_take`."""
+    return {
+        "neutral": arguments.neutral,
+        "method": arguments.method,
+        "alpha": arguments.alpha,
+        "adaptation": arguments.adaptation,
+        "sparsity": arguments.sparsity,
+        "head_slack": arguments.head_slack,
+        "slip": arguments.slip,
+        "creep": False if arguments.keep_creep else None,
+        "signer": arguments.signer_bases,
     }
 
 

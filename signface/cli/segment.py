@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from signface.cli.options import add_solve_arguments, read_face_and_layout
+from signface.cli.options import add_solve_arguments, read_face_and_layout, solve_options
 from signface.errors import SignfaceError
 
 EXAMPLE = """  signface segment weights.csv -o segments.csv
@@ -36,9 +36,7 @@ def run(arguments: argparse.Namespace) -> None:
             descriptors,
             face=face,
             layout=layout,
-            neutral=arguments.neutral,
-            method=arguments.method,
-            alpha=arguments.alpha,
+            **solve_options(arguments),
         )
     segments = segment(descriptors)
     write_segments(segments, arguments.output)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
+from dataclasses import replace
 from pathlib import Path
 
-from signface.cli.options import add_solve_arguments, output_files, read_face_and_layout
+from signface.cli.options import add_solve_arguments, output_files, read_face_and_layout, solve_options
 from signface.cli.progress import progress
 from signface.errors import SignfaceError
 
@@ -22,6 +24,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--format", choices=("csv", "parquet"), default="csv", help="ending in a folder (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--uncertainty",
+        action="store_true",
+        help="also write the weights' standard deviations, beside the weights: NAME.sd.csv or NAME.sd.parquet",
     )
     add_solve_arguments(parser)
 
@@ -44,17 +51,26 @@ def run(arguments: argparse.Namespace) -> int:
     for take, file in progress(list(zip(arguments.takes, files, strict=True)), "solving"):
         try:
             residuals: list[np.ndarray] = []
-            with WeightsWriter(file) as writer:
+            with contextlib.ExitStack() as open_files:
+                writer = open_files.enter_context(WeightsWriter(file))
+                doubts = (
+                    open_files.enter_context(WeightsWriter(file.with_suffix(f".sd{file.suffix}")))
+                    if arguments.uncertainty
+                    else None
+                )
                 for piece in describe_pieces(
                     open_recording(take),
                     face=face,
                     layout=layout,
-                    neutral=arguments.neutral,
-                    method=arguments.method,
-                    alpha=arguments.alpha,
+                    **solve_options(arguments),
+                    uncertainty=arguments.uncertainty,
                     progress=progress,
                 ):
                     writer.append(piece)
+                    if doubts is not None:
+                        if piece.deviation is None:
+                            raise SignfaceError("holds weights already: how sure they are is not known", file=take)
+                        doubts.append(replace(piece, weights=piece.deviation, deviation=None))
                     assert piece.residual is not None
                     residuals.append(piece.residual)
         except SignfaceError as error:
@@ -63,6 +79,9 @@ def run(arguments: argparse.Namespace) -> int:
             failed += 1
             print(f"signface: {error}", file=sys.stderr)
             continue
+        for note in piece.history:
+            if note.startswith("warning: "):
+                print(f"signface: {file}: {note}", file=sys.stderr)
         residual = median_known(np.concatenate(residuals))
         fit = "unknown" if residual is None else f"{residual:.2f} mm"
         print(f"{file}: {writer.frames} frames, {len(piece.names)} bases, median residual {fit}")

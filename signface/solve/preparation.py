@@ -106,6 +106,12 @@ class Preparation:
         self.recording = clean
         labels = [label for label in layout.face_labels if label in clean.labels]
         head = [label for label in layout.head_labels if label in clean.labels]
+        if len(labels) < 4:
+            raise SignfaceError(
+                f"has {len(labels)} of the face markers of the layout {layout.name}, and at least 4 are needed",
+                file=clean.name,
+                hint="use a layout with more of its face markers",
+            )
         if neutral != "auto":
             clean.frame_at(float(neutral))
         view = clean.view(VIEW_FRAMES, piece=piece, progress=progress)

@@ -84,6 +84,8 @@ class MarkerBases:
     scale : float
         Mean over the observed bases of their summed squared displacement at the markers (unit squared): what one
         typical base, fully active, does to the markers.
+    warning : str
+        With `skin`: which bases the markers alone do not tell apart; empty when they tell all.
 
     Raises
     ------
@@ -127,14 +129,31 @@ class MarkerBases:
         typical = np.median(energy[energy > 1e-12 * energy.max()])
         self.observed = energy > OBSERVED_SHARE**2 * typical
         self.scale = float(energy[self.observed].mean())
+        at_markers = f"at the markers of the layout {layout.name}"
+        self.warning = ""
         if skin:
             everywhere = face.bases[self.observed].reshape(int(self.observed.sum()), -1).T
-            self._check_independent(everywhere, f"on the skin of {face.name}")
-        else:
-            self._check_independent(self.matrix[:, self.observed], f"at the markers of the layout {layout.name}")
+            if alike := self._dependent(everywhere):
+                raise self._refusal(alike, f"on the skin of {face.name}")
+            if alike := self._dependent(self.matrix[:, self.observed]):
+                self.warning = f"bases are linearly dependent {at_markers}, and the shell alone decides: {alike}"
+        elif 3 * self.n_markers < self.observed.sum():
+            raise SignfaceError(
+                f"{self.n_markers} face markers (3 coordinates each) cannot tell apart"
+                f" the {self.observed.sum()} bases of {self.face_name} that move them",
+                hint=f"use at least {-(-self.observed.sum() // 3)} face markers",
+            )
+        elif alike := self._dependent(self.matrix[:, self.observed]):
+            raise self._refusal(alike, at_markers)
 
-    def _check_independent(self, columns: np.ndarray, where: str) -> None:
-        """Raise when observed bases, given as (k, n) columns, are linearly dependent, naming them.
+    def _refusal(self, alike: str, where: str) -> SignfaceError:
+        return SignfaceError(
+            f"bases of {self.face_name} are linearly dependent {where}: {alike}",
+            hint="drop one of them from the face, or add markers that tell them apart",
+        )
+
+    def _dependent(self, columns: np.ndarray) -> str:
+        """The observed bases that are linearly dependent, given as (k, n) columns, in words; nothing if none is.
 
         Of two bases that are exactly opposed (an eye turned in and out), weights of 0 or more tell which one acts:
         that is no ambiguity, and only one of them is looked at.
@@ -142,24 +161,15 @@ class MarkerBases:
         names = np.array(self.names)[self.observed]
         length = np.linalg.norm(columns, axis=0)
         opposed = (np.triu((columns / length).T @ (columns / length), k=1) < OPPOSED).any(axis=0)
-        columns, names = columns[:, ~opposed], names[~opposed]
-        if len(columns) < columns.shape[1]:
-            raise SignfaceError(
-                f"{self.n_markers} face markers (3 coordinates each) cannot tell apart"
-                f" the {columns.shape[1]} bases of {self.face_name} that move them",
-                hint=f"use at least {-(-columns.shape[1] // 3)} face markers",
-            )
+        columns, names = columns[:, ~opposed] / length[~opposed], names[~opposed]
         # R of a QR factorisation has the singular values and rows of the many rows it stands for.
-        _, values, rows = np.linalg.svd(np.linalg.qr(columns / np.linalg.norm(columns, axis=0), mode="r"))
-        null = rows[values < DEPENDENT * values[0]]
-        if len(null):
-            share = np.abs(null).max(axis=0)
-            involved = names[share > 0.05 * share.max()]
-            listed = ", ".join(involved[:8]) + (f" and {len(involved) - 8} more" if len(involved) > 8 else "")
-            raise SignfaceError(
-                f"bases of {self.face_name} are linearly dependent {where}: {listed}",
-                hint="drop one of them from the face, or add markers that tell them apart",
-            )
+        _, values, rows = np.linalg.svd(np.linalg.qr(columns, mode="r"), full_matrices=True)
+        null = rows[np.append(values, np.zeros(len(rows) - len(values))) < DEPENDENT * values[0]]
+        if not len(null):
+            return ""
+        share = np.abs(null).max(axis=0)
+        involved = names[share > 0.05 * share.max()]
+        return ", ".join(involved[:8]) + (f" and {len(involved) - 8} more" if len(involved) > 8 else "")
 
     def checked(self, displacements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The displacements as (F, 3P) rows with 0 for missing markers, and the (F, P) bool array of present ones.

@@ -21,6 +21,8 @@ from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.solve.methods import make_solver
 from signface.solve.preparation import Preparation, PreparedTake, prepare_take
+from signface.solve.thin_shell import ThinShellSolver
+from signface.solve.uncertainty import deviations
 from signface.takes.cleaning import Progress, silently
 from signface.takes.recording import PIECE, Recording, pieces
 
@@ -59,6 +61,8 @@ def solve_take(
         not for its rivals.
     signer : path, optional
         A file of the signer's own bases, made by `signface calibrate`; only the thin shell uses it.
+    uncertainty : bool
+        Also give the weights' standard deviations (`signface.solve.uncertainty`); only the thin shell can.
     short_gap_s, long_gap_s : float
         Longest gaps that are filled (seconds), see `signface.takes.gaps.fill_gaps`.
     cutoff_hz, filter_method
@@ -105,6 +109,7 @@ def solve_take(
         start=recording.start,
         residual=np.concatenate([part.residual for part in parts if part.residual is not None]),
         head=np.concatenate([part.head for part in parts if part.head is not None]),
+        deviation=None if parts[0].deviation is None else np.concatenate([part.deviation for part in parts]),
         name=recording.name,
         history=parts[-1].history,
     )
@@ -121,6 +126,7 @@ def solve_pieces(
     head_slack: float | None = None,
     slip: float | None = None,
     creep: bool | None = None,
+    uncertainty: bool = False,
     piece: int = PIECE,
     progress: Progress = silently,
     **options: Any,
@@ -141,7 +147,11 @@ def solve_pieces(
     creep = method == "thin-shell" if creep is None else creep
     preparation = Preparation(recording, face, layout, creep=creep, piece=piece, progress=progress, **options)
     solver = make_solver(method, face, preparation.layout, signer_bases=preparation.signer_bases, **given)
+    known = solver if isinstance(solver, ThinShellSolver) else None
+    if uncertainty and known is None:
+        raise SignfaceError(f"the method {method} does not say how uncertain it is", hint="use thin-shell")
     note = f"{preparation.note}; solve {method}" + "".join(f" {name}={value:g}" for name, value in given.items())
+    warnings = [f"warning: {known.markers.warning}"] if known is not None and known.markers.warning else []
     for begin, end in progress(pieces(recording.n_frames, piece), "solving"):
         displacements, head = preparation.frames(begin, end)
         solution = solver.solve(displacements)
@@ -152,6 +162,7 @@ def solve_pieces(
             start=recording.start + begin / recording.rate,
             residual=solution.residual,
             head=head,
+            deviation=deviations(known, solution) if uncertainty and known is not None else None,
             name=recording.name,
-            history=(*(preparation.history if end == recording.n_frames else recording.history), note),
+            history=(*(preparation.history if end == recording.n_frames else recording.history), note, *warnings),
         )

@@ -242,7 +242,7 @@ class ThinShellSolver:
         self._last = weights[0, self._whole.places]
         return Solution(weights, residual)
 
-    def uncertainty(self, weights: np.ndarray, marker_error: float) -> np.ndarray:
+    def uncertainty(self, weights: np.ndarray, marker_error: float | np.ndarray) -> np.ndarray:
         """Standard deviation of each weight, from the curvature of the energy at the optimum.
 
         With independent errors of the markers' coordinates and the energy read as a log-likelihood, the weights'
@@ -253,8 +253,9 @@ class ThinShellSolver:
         ----------
         weights : (F, N) array
             Solved weights.
-        marker_error : float
-            Standard deviation of a marker's coordinate in the face's unit (jitter and misfit, 0.3 mm say).
+        marker_error : float or (F,) array
+            Standard deviation of a marker's coordinate in the face's unit (jitter and misfit, 0.3 mm say), the same or
+            each frame's own.
 
         Returns
         -------
@@ -266,14 +267,14 @@ class ThinShellSolver:
         own = np.asarray(weights)[:, observed]
         held = self.holding * holding_curvature(own, self.sparsity)
         # D is the squared error over `scale`: a log-likelihood is it times scale / (2 * marker_error^2).
-        factor = marker_error / np.sqrt(self.markers.scale)
+        factor = np.broadcast_to(marker_error, len(own))[:, None] / np.sqrt(self.markers.scale)
         diagonal = np.arange(own.shape[1])
         normal = self._whole.normal
         for start in range(0, len(own), 1024):
             hessian = np.broadcast_to(normal, (len(own[start : start + 1024]), *normal.shape)).copy()
             hessian[:, diagonal, diagonal] += 0.5 * held[start : start + 1024]
             variance = np.linalg.inv(hessian)[:, diagonal, diagonal]
-            result[start : start + 1024, observed] = factor * np.sqrt(np.maximum(variance, 0.0))
+            result[start : start + 1024, observed] = factor[start : start + 1024] * np.sqrt(np.maximum(variance, 0.0))
         return result
 
     def _problem(self, pattern: np.ndarray) -> Problem:

@@ -1,0 +1,67 @@
+"""`signface calibrate`: a signer's own bases, from a take in which named bases are shown."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from signface.cli.options import add_face_arguments, neutral_time, read_face_and_layout
+from signface.errors import SignfaceError
+
+EXAMPLE = """  signface calibrate range-of-motion.c3d shown.csv -o signer.csv
+  signface solve take.c3d --signer-bases signer.csv -o weights.csv
+
+shown.csv says what is shown when, from rest to rest, nothing of how strongly:
+  start_s,end_s,bases
+  2.0,3.1,browInnerUp
+  3.1,4.3,browDown*
+  4.3,5.2,jawOpen"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Fill the parser of this command."""
+    parser.add_argument("take", type=Path, metavar="TAKE", help="a recording in which the signer shows named bases")
+    parser.add_argument(
+        "shown", type=Path, metavar="SHOWN", help="a .csv: start_s, end_s, bases (joined by +, * for Left and Right)"
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="FILE", help="the signer's bases, for --signer-bases (.csv)"
+    )
+    add_face_arguments(parser)
+    parser.add_argument(
+        "--neutral",
+        default="auto",
+        type=neutral_time,
+        metavar="SECONDS",
+        help="time of a frame with a neutral face, or auto (default: %(default)s)",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Learn the signer's bases and say which, and how far they are from the avatar's."""
+    import numpy as np
+
+    from signface.descriptors import Descriptors
+    from signface.face.layout_files import choose_layout
+    from signface.solve.range_of_motion import calibrate_shown, read_shown, write_signer
+    from signface.solve.solving import prepare_take
+    from signface.takes.reading import open_recording
+
+    if arguments.output.suffix.lower() != ".csv":
+        raise SignfaceError("a signer's bases are written as .csv", file=arguments.output)
+    recording = open_recording(arguments.take)
+    if isinstance(recording, Descriptors):
+        raise SignfaceError("holds weights, not markers", file=arguments.take)
+    face, layout = read_face_and_layout(arguments)
+    shown = read_shown(arguments.shown, face.names)
+    layout = choose_layout(recording.labels, face) if layout is None else layout
+    prepared = prepare_take(recording, face, layout, neutral=arguments.neutral)
+    bases, learnt = calibrate_shown(
+        prepared.displacements, shown, face, prepared.layout, rate=recording.rate, start_s=recording.start
+    )
+    write_signer(bases, learnt, face, prepared.layout, arguments.output)
+    own = [face.names.index(name) for name in learnt]
+    avatar = prepared.layout.bases(face)[own]
+    apart = float(np.sqrt(((bases[own] - avatar) ** 2).sum() / (avatar**2).sum()))
+    print(f"{arguments.output}: {len(learnt)} of {face.n_bases} bases, {apart:.0%} away from the avatar's")
+    return 0
