@@ -49,8 +49,10 @@ from signface.solve.bounds import (
 SLIP_ROUNDS = 2
 #: Steps after which a frame is left to the damped method.
 QUICK_STEPS = 60
-#: Steps after which every other one is halved.
-CIRCLE = 10
+#: Steps that are taken whole, whatever they lead to: nearly all frames need no more.
+TRUSTED = 16
+#: Points tried along a later step.
+TRIALS = 12
 #: Steps of the damped method, each halving the gradient at worst near the optimum.
 DAMPED_STEPS = 400
 #: A curvature in the kept inverse may be off by this share.
@@ -77,7 +79,7 @@ def _compiled(function: Callable) -> Callable:
     """
     make = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
     made = make(function)
-    with contextlib.suppress(RuntimeError):
+    with contextlib.suppress(RuntimeError, AttributeError):  # no folder can be written; NUMBA_DISABLE_JIT is set
         made.enable_caching()
     return made
 
@@ -150,7 +152,7 @@ def _follow(right, quad, free, stiffness, pull, tolerance, inverse, state, which
     # Slopes are taken to be `taken + curve * (c - weight)` around the weights `weight`; `true` and `bend` are the
     # slopes and curvatures there. `balance` is 2 A weight.
     weight, curve, taken, true, bend = state[0], state[1], state[2], state[3], state[4]
-    balance, error, move = state[5], state[6], state[7]
+    balance, error, move, beyond = state[5], state[6], state[7], state[8]
     for frame in range(len(right)):
         total = 0.0
         for i in range(n):
@@ -204,52 +206,72 @@ def _follow(right, quad, free, stiffness, pull, tolerance, inverse, state, which
                         _correct(inverse, i, curve[i], move)
             _combine(inverse, error, which, some, move)
             # Short loops over few arrays each, so that the compiler makes vectors of them.
-            # Steps that go round in a circle, from piece to piece, are broken by half ones.
-            part = 0.5 if step > CIRCLE and step % 2 else 1.0
+            part, low, high = 1.0, 0.0, 1.0
             for i in range(n):
-                taken[i] -= part * curve[i] * move[i]
+                taken[i] -= curve[i] * move[i]
             for i in range(n):
-                weight[i] -= part * move[i]
-            for i in range(n):
-                below = -weight[i] if weight[i] < 0.0 else 0.0
-                above = weight[i] - 1.0 if weight[i] > 1.0 else 0.0
-                move[i] = below + above
-            farthest = 0.0
-            for i in range(n):
-                farthest = max(farthest, move[i])
-            for i in range(n):  # exp(x) - 1
-                x = min(move[i], NEAR) / SMOOTHING
-                high = 1 + x / 5 * (1 + x / 6 * (1 + x / 7 * (1 + x / 8 * (1 + x / 9))))
-                move[i] = x * (1 + x / 2 * (1 + x / 3 * (1 + x / 4 * high)))
-            for i in range(n):
-                resting = max(0.0, min(weight[i], knee))
-                held = stiffness * move[i]
-                true[i] = lean * resting + (-held if weight[i] < 0.0 else held)
-            for i in range(n):
-                inside = lean if weight[i] < knee else 0.0
-                held = stiff * (move[i] + 1.0)
-                bend[i] = held if weight[i] < 0.0 or weight[i] > 1.0 else inside
-            if farthest > NEAR and stiffness > 0.0:
+                weight[i] -= move[i]
+            for _trial in range(TRIALS):
+                # Short loops over few arrays each, so that the compiler makes vectors of them.
                 for i in range(n):
-                    far = -weight[i] if weight[i] < 0.0 else weight[i] - 1.0
-                    if far <= NEAR:
-                        continue
-                    # Far outside, the exponential would throw the next step away. It is linearised no further out than
-                    # where its slope is what the last step took it to be, or one smoothing.
-                    force = -taken[i] if weight[i] < 0.0 else taken[i] - pull
-                    x = min(far, SMOOTHING * log1p(force / stiffness) if force > 0.0 else SMOOTHING)
-                    if far - x > 0.01 * SMOOTHING:
-                        farthest = inf
-                    else:
-                        x = far
-                    bend[i] = stiff * exp(x / SMOOTHING)
-                    held = bend[i] * SMOOTHING - stiffness + bend[i] * (far - x)
-                    true[i] = -held if weight[i] < 0.0 else pull + held
-            total = 0.0
+                    below = -weight[i] if weight[i] < 0.0 else 0.0
+                    above = weight[i] - 1.0 if weight[i] > 1.0 else 0.0
+                    beyond[i] = below + above
+                farthest = 0.0
+                for i in range(n):
+                    farthest = max(farthest, beyond[i])
+                for i in range(n):  # exp(x) - 1
+                    x = min(beyond[i], NEAR) / SMOOTHING
+                    series = 1 + x / 5 * (1 + x / 6 * (1 + x / 7 * (1 + x / 8 * (1 + x / 9))))
+                    beyond[i] = x * (1 + x / 2 * (1 + x / 3 * (1 + x / 4 * series)))
+                for i in range(n):
+                    resting = max(0.0, min(weight[i], knee))
+                    held = stiffness * beyond[i]
+                    true[i] = lean * resting + (-held if weight[i] < 0.0 else held)
+                for i in range(n):
+                    inside = lean if weight[i] < knee else 0.0
+                    held = stiff * (beyond[i] + 1.0)
+                    bend[i] = held if weight[i] < 0.0 or weight[i] > 1.0 else inside
+                if farthest > NEAR and stiffness > 0.0:
+                    for i in range(n):
+                        far = -weight[i] if weight[i] < 0.0 else weight[i] - 1.0
+                        if far <= NEAR:
+                            continue
+                        # Far outside, the exponential would throw the next step away. It is linearised no further out
+                        # than where its slope is what the last step took it to be, or one smoothing.
+                        force = -taken[i] if weight[i] < 0.0 else taken[i] - pull
+                        x = min(far, SMOOTHING * log1p(force / stiffness) if force > 0.0 else SMOOTHING)
+                        if far - x > 0.01 * SMOOTHING:
+                            farthest = inf
+                        else:
+                            x = far
+                        bend[i] = stiff * exp(x / SMOOTHING)
+                        held = bend[i] * SMOOTHING - stiffness + bend[i] * (far - x)
+                        true[i] = -held if weight[i] < 0.0 else pull + held
+                total, before, after = 0.0, 0.0, 0.0
+                for i in range(n):
+                    apart = true[i] - taken[i] + (1.0 - part) * error[i]
+                    total += apart * apart
+                    before += move[i] * error[i]
+                    after += move[i] * apart
+                if step < TRUSTED:
+                    break
+                if after < -0.25 * before:
+                    high = part
+                elif part < 1.0 and after > 0.9 * before:
+                    low = part
+                else:
+                    break
+                # The energy rises again at the end of the step, or has hardly fallen: seek along the step for where it
+                # is about least.
+                back = part - 0.5 * (low + high)
+                part -= back
+                for i in range(n):
+                    taken[i] += back * curve[i] * move[i]
+                for i in range(n):
+                    weight[i] += back * move[i]
             for i in range(n):
-                apart = true[i] - taken[i] + (1.0 - part) * error[i]
-                error[i] = apart
-                total += apart * apart
+                error[i] = true[i] - taken[i] + (1.0 - part) * error[i]
             for i in range(n):
                 taken[i] = true[i]
             if total <= tolerance * tolerance and farthest < inf:
@@ -355,7 +377,7 @@ class Problem:
         room = min(frames, BLOCK)
         right, solved, placed = np.empty((room, padded)), np.empty((room, padded)), np.empty((room, len(self._bases)))
         # The first and the second solve each go on from their own last frame.
-        inverses, states, ages = np.empty((2, padded, padded)), np.zeros((2, 8, padded)), [RENEW, RENEW]
+        inverses, states, ages = np.empty((2, padded, padded)), np.zeros((2, 9, padded)), [RENEW, RENEW]
         if first is not None:
             states[:, 0, : len(first)] = first
         for begin in range(0, frames, BLOCK):
