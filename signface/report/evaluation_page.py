@@ -43,11 +43,9 @@ def evaluation_page(evaluated: Evaluated, drawn: Mapping[str, Sequence[Drawn]]) 
         _section("signers", "Signer by signer", _signers(evaluated), []),
         _section("comparison", "Classifiers against each other", _comparison(evaluated), []),
         _section("confidence", "Confidence, intensity, parameters", _confidence(evaluated), drawn["confidence"]),
+        _section("curve", "What more material brings", _curve(evaluated), drawn["curve"]),
+        _section("importance", "Which bases matter", _importance(evaluated), drawn["importance"]),
     ]
-    if drawn["curve"]:
-        sections.append(_section("curve", "What more material brings", _curve(evaluated), drawn["curve"]))
-    if metrics["importance"]:
-        sections.append(_section("importance", "Which bases matter", _importance(evaluated), drawn["importance"]))
     figures = {figure.name: figure for kind in ("worst", "gallery") for figure in drawn[kind]}
     return (
         environment()
@@ -291,7 +289,11 @@ def _confidence(evaluated: Evaluated) -> tuple[list[str], list[dict[str, Any]]]:
 
 def _curve(evaluated: Evaluated) -> tuple[list[str], list[dict[str, Any]]]:
     curves = evaluated.metrics["learning_curve"]
-    paragraphs = ["Each classifier was trained on growing parts of the training takes, in several random orders."]
+    paragraphs = []
+    if any(curves.values()):
+        paragraphs.append(
+            "Each classifier was trained on growing parts of the training takes, in several random orders."
+        )
     shown = []
     for protocol, points in curves.items():
         table = pd.DataFrame(points)
