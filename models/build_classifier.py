@@ -138,7 +138,26 @@ Its borders against the reference's (for `thesis-forest`, those of `signface seg
 The references carry the uncertainty of an annotator, 30 to 80 ms: the exact borders reach 0.93 within 0.10 s.
 
 Segments of one take are alike: the interval comes from drawing whole takes again.
-"""
+
+{_reliability(truth)}
+{_intensity(sections.get("intensity"))}"""
+
+
+def _reliability(scores: dict) -> str:
+    error, brier = scores["calibration_error"], scores["brier"]
+    return f"Confidence in the labels of reference segments: expected calibration error {error:.2f}, Brier {brier:.2f}."
+
+
+def _intensity(scores: dict | None) -> str:
+    """What is known of the intensities that it gives, if it does."""
+    if scores is None:
+        return ""
+    told = "; ".join(
+        f"{how}, exact {part['exact']:.2f}, within one {part['within_one']:.2f}, "
+        f"mean error {part['mean_absolute_error']:.2f}"
+        for how, part in scores.items()
+    )
+    return f"Intensity (1 to 3) of {scores['learnt']['n']} reference segments: {told}.\n"
 
 
 def _interval(scores: dict) -> str:

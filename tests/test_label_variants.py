@@ -10,6 +10,7 @@ from sklearn.base import clone
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
+from signface.evaluate.protocol import evaluate, folds_of
 from signface.label.labelling import find_segments, label_spans
 from signface.label.persistence import load_model, save_model
 from signface.label.training import train_model
@@ -128,3 +129,17 @@ def test_a_sequence_model_takes_no_other_features():
     takes = [e for e in corpus() if e.kind == "IE"]
     with pytest.raises(SignfaceError, match="its own features"):
         train_model(takes, classifier="hmm", features=("weights", "windows"))
+
+
+def test_an_evaluation_normalises_signers_by_their_test_takes():
+    examples = corpus()
+    folds = folds_of(examples, protocol="across", train_kinds=["IE"], test_kinds=["EU"])
+    training = {"normalise": "signer", "aggregate": "frames"}
+    table = evaluate(folds, classifiers=["forest"], training=training).tables["forest"]["manual_segments"]
+    model = train_model(folds[0].train, classifier="forest", **training)
+    level = signer_level([e.descriptors for e in folds[0].test])
+    tested = folds[0].test[0]
+    spans = tested.stable[["start_s", "end_s"]].to_numpy()
+    _, sure = label_spans(tested.descriptors, spans, model, level=level)
+    assert table.loc[table["take"] == tested.take, "confidence"].tolist() == sure
+    assert sure != label_spans(tested.descriptors, spans, model)[1]

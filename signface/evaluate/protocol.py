@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import combinations
 from typing import Any
 
@@ -268,17 +269,26 @@ def score_model(model: TrainedModel, test: Sequence[Example], *, seed: int = 0) 
     Returns
     -------
     dict
-        `manual_segments`, `automatic_segments` and `frames` as in metrics.json, and `segmentation`.
+        `manual_segments`, `automatic_segments` and `frames` as in metrics.json, `segmentation`, and `intensity` where
+        the model gives it.
     """
     parts: dict[str, list[pd.DataFrame]] = {}
-    pairs = []
+    pairs, strengths = [], []
+    levels = signer_levels(test) if model.card.normalise == "signer" else {}
     for example in test:
-        found = find_segments(example.descriptors, model) if model.sequential else segment(example.descriptors)
+        level = levels.get(example.signer)
+        cut = partial(find_segments, model=model, level=level) if model.sequential else segment
+        found = cut(example.descriptors)
         pairs.append((example.reference.table, found.table))
-        for section, table in _compared(example, found, model)[0].items():
+        for section, table in _compared(example, found, model, level)[0].items():
             parts.setdefault(section, []).append(table.assign(take=f"{example.signer}/{example.take}"))
+        if model.intensity is not None:
+            strengths.append(_intensities(example, model.intensity))
     scores = _scores({section: pd.concat(tables) for section, tables in parts.items()}, seed)
-    return {**scores, "segmentation": segmentation_metrics(pairs)}
+    scores["segmentation"] = segmentation_metrics(pairs)
+    if strengths:
+        scores["intensity"] = _intensity_scores(pd.concat(strengths, ignore_index=True))
+    return scores
 
 
 def _compared(
@@ -288,7 +298,7 @@ def _compared(
     descriptors, reference = example.descriptors, example.stable
     manual = reference[["start_s", "end_s", "label"]].rename(columns={"label": "truth"})
     manual["found"], manual["confidence"] = label_spans(
-        descriptors, manual[["start_s", "end_s"]].to_numpy(float), model
+        descriptors, manual[["start_s", "end_s"]].to_numpy(float), model, level=level
     )
     stable = found.table[found.table["kind"] == "stable"]
     spans = stable[["start_s", "end_s"]].to_numpy(float)
