@@ -1,6 +1,8 @@
 """Synthetic signers whom no solver has met, with their takes brought to the avatar.
 
 - `make_recordings`: takes of some signers, prepared for solving, with the weights that show the same on the avatar.
+- `without_creep`: displacements with what the markers crept taken away, as `solve_take` does.
+- `slipped`: displacements in which markers have slipped.
 - `own_face`: markers on the avatar itself.
 
 Signers, takes and noise are those of `signface synth` (other heads by 4 to 6 mm RMS, bases stronger, weaker and turned,
@@ -18,6 +20,8 @@ from signface.corpus.synthetic_expressions import Spread
 from signface.corpus.synthetic_markers import head_motion, record
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
+from signface.solve.creep import RATE_HZ, Creep
+from signface.solve.range_of_motion import Shown
 from signface.solve.solving import prepare_take
 from signface.takes.take import Take
 
@@ -36,20 +40,25 @@ class Recording:
         By the name of the adaptation, millimetres, NaN where a marker is missing.
     weights : (F, N) array
         Weights with which the avatar shows what the signer shows.
+    shown : tuple of Shown
+        In a range-of-motion take, what somebody wrote down of it.
     """
 
     signer: int
     name: str
     displacements: dict[str, np.ndarray]
     weights: np.ndarray
+    shown: tuple[Shown, ...] = ()
 
 
-def _prepared(signer: int, name: str, take: Take, neutral_s: float, weights: np.ndarray, face, layout) -> Recording:
+def _prepared(
+    signer: int, name: str, take: Take, neutral_s: float, weights: np.ndarray, face, layout, shown=()
+) -> Recording:
     displacements = {
         adaptation: prepare_take(take, face, layout, neutral=neutral_s, adaptation=adaptation).displacements
         for adaptation in ("similarity", "rbf")
     }
-    return Recording(signer, name, displacements, weights)
+    return Recording(signer, name, displacements, weights, tuple(shown))
 
 
 def make_recordings(
@@ -77,21 +86,48 @@ def make_recordings(
 
 
 def _range_of_motion(face: FaceModel, layout: MarkerLayout, seed: int, signer: int) -> Recording:
-    """A second of rest, then each base rising to its full strength and falling again within 0.8 s."""
+    """A second of rest, then each base rising and falling again within 0.8 s.
+
+    Nobody shows a base as a machine would: each has a strength of its own (0.6 to 1), another base or two move along a
+    little (up to 0.15), and what is written down of when it was shown is 0.05 s off.
+    """
     who = make_signer(seed, signer, Spread())
     rng = np.random.default_rng([seed, signer])
     rest, length = int(RATE), int(0.8 * RATE)
     weights = np.zeros((rest + length * face.n_bases, face.n_bases))
     shape = np.sin(np.linspace(0.0, np.pi, length)) ** 2
+    shown = []
     for base in range(face.n_bases):
         start = rest + base * length
-        weights[start : start + length, base] = shape
+        weights[start : start + length, base] = rng.uniform(0.6, 1.0) * shape
+        for other in rng.choice(face.n_bases, rng.integers(0, 3), replace=False):
+            weights[start : start + length, other] += rng.uniform(0.0, 0.15) * shape
+        begin, end = np.array([start, start + length]) / RATE + rng.normal(0.0, 0.05, 2)
+        shown.append(Shown(begin, end, (face.names[base],)))
     plan = make_plan(Job(seed, signer, "IE", 0), who.habits)
     time = np.arange(len(weights)) / RATE
     poses = head_motion(plan, time, RATE, rng)
     positions = record(who.head, who.glued, weights, poses, plan, RATE, rng)
     take = Take(positions, who.glued.labels, RATE, name=f"S{signer + 1}_ROM")
-    return _prepared(signer, take.name, take, 0.5, who.head.avatar_weights(weights), face, layout)
+    return _prepared(signer, take.name, take, 0.5, who.head.avatar_weights(weights), face, layout, shown)
+
+
+def without_creep(
+    displacements: np.ndarray, face: FaceModel, layout: MarkerLayout, signer_bases: np.ndarray | None = None
+) -> np.ndarray:
+    """(F, P, 3) displacements of a whole take at `RATE` with the creep of its markers taken away."""
+    step = round(RATE / RATE_HZ)
+    creep = Creep(displacements[::step], RATE / step, face, layout, signer_bases=signer_bases)
+    return displacements - creep.at(np.arange(len(displacements)) / step)
+
+
+def slipped(displacements: np.ndarray, seed: int) -> np.ndarray:
+    """(F, P, 3) displacements in which two markers stand 4 mm beside their places for a third of the take."""
+    rng, result = np.random.default_rng(seed), displacements.copy()
+    for _ in range(2):
+        start, aside = rng.integers(0, len(result) // 2), rng.normal(size=3)
+        result[start : start + len(result) // 3, rng.integers(result.shape[1])] += 4.0 * aside / np.linalg.norm(aside)
+    return result
 
 
 def own_face(layout: MarkerLayout, face: FaceModel, weights: np.ndarray, jitter_mm: float, seed: int) -> np.ndarray:
