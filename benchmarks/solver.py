@@ -143,6 +143,9 @@ def accuracy(face: FaceModel, layout: MarkerLayout, recordings: list[Recording],
         recordings, "similarity", EVERY, lambda one, whole: without_creep(slips(one, whole), face, layout)
     )
     rows["markers slipped: thin-shell"] = judge(base.solve(frames).weights, truth)
+    rows["markers slipped: thin-shell, every marker trusted"] = judge(
+        ThinShellSolver(face, layout, slip=0.0).solve(frames).weights, truth
+    )
     frames, truth = together(recordings, "similarity", SLOW_EVERY, slips)
     rows["markers slipped: bounded"] = judge(bounded.solve(frames).weights, truth)
     _, truth = together(recordings, "similarity", EVERY)
