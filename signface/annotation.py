@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from signface.descriptors import Descriptors
-from signface.segment.segments import Segments
 
 if TYPE_CHECKING:
     from signface.face.layout import MarkerLayout
     from signface.face.model import FaceModel
     from signface.label.model import TrainedModel
     from signface.label.variants import SignerLevel
+    from signface.segment.segments import Segments
     from signface.takes.recording import Recording
 
 

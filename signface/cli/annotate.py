@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
         "into": arguments.into,
         "replace": arguments.replace,
     }
-    _import_for_solving()
+    _import_shared()
     failed = 0
     with ThreadPoolExecutor(1) as beside:
         model = beside.submit(_load_model, arguments.classifier)
@@ -111,29 +111,22 @@ def run(arguments: argparse.Namespace) -> int:
     return 2 if failed else 0
 
 
-def _import_for_solving() -> None:
-    """Import what reading and solving need, before a thread imports other things beside them.
-
-    Two threads that import packages which import one another can meet each other's half-made modules.
-    """
+def _import_shared() -> None:
+    """Import what both threads need: two that import one package at a time can meet each other's half-made modules."""
     import scipy.ndimage
     import scipy.sparse.linalg
     import scipy.spatial.transform  # noqa: F401
 
-    import signface.annotation
-    import signface.face.layout_files
-    import signface.solve.solving
-    import signface.takes.reading  # noqa: F401
+    import signface.descriptors  # noqa: F401
 
 
 def _load_model(name: str) -> TrainedModel:
     """The classifier, and what labelling and writing import: a second's work, done while the first take is solved."""
     import signface.elan.output
     import signface.label.labelling  # noqa: F401
-    from signface.label.persistence import hasten, load_model
+    from signface.label.persistence import load_model
 
-    hasten()
-    return load_model(name)
+    return load_model(name, quickly=True)
 
 
 def _described(

@@ -7,12 +7,13 @@
 
 from __future__ import annotations
 
+import csv
+import math
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from scipy.spatial import cKDTree
 
 from signface.errors import SignfaceError
@@ -50,12 +51,9 @@ def read_layout(name_or_path: str | PathLike[str], face: FaceModel) -> MarkerLay
     file = known.get(str(name_or_path), Path(name_or_path))
     if not file.is_file():
         raise SignfaceError("no such layout", file=file, hint=f"the shipped layouts are {', '.join(known)}")
-    try:
-        table = pd.read_csv(file, dtype={"marker": str, "role": str}, comment="#")
-    except (OSError, ValueError, pd.errors.ParserError, pd.errors.EmptyDataError) as error:
-        raise SignfaceError("cannot be read as a csv", file=file) from error
-    has_points = {"x", "y", "z"} <= set(table.columns)
-    if not {"marker", "role"} <= set(table.columns) or not (has_points or "vertex" in table.columns):
+    table = _columns(file)
+    has_points = {"x", "y", "z"} <= set(table)
+    if not {"marker", "role"} <= set(table) or not (has_points or "vertex" in table):
         raise SignfaceError("is no layout", file=file, hint="its columns are marker, role, and vertex or x, y, z")
     try:
         return _placed(table, face, file, has_points)
@@ -63,19 +61,46 @@ def read_layout(name_or_path: str | PathLike[str], face: FaceModel) -> MarkerLay
         raise SignfaceError(error.problem, file=file, hint=error.hint) from error
 
 
-def _placed(table: pd.DataFrame, face: FaceModel, file: Path, has_points: bool) -> MarkerLayout:
+def _columns(file: Path) -> dict[str, np.ndarray]:
+    """The cells of a csv by column, without spaces around them; what follows a `#` is a comment."""
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+        lines = [line.partition("#")[0] for line in text.splitlines()]
+        heads, *rows = [[cell.strip() for cell in row] for row in csv.reader(line for line in lines if line.strip())]
+    except (OSError, ValueError, csv.Error) as error:
+        raise SignfaceError("cannot be read as a csv", file=file) from error
+    if len(set(heads)) < len(heads) or any(len(row) > len(heads) for row in rows):
+        raise SignfaceError("cannot be read as a csv", file=file, hint="every row has as many cells as the first")
+    return {
+        head: np.array([row[place] if place < len(row) else "" for row in rows], dtype=str)
+        for place, head in enumerate(heads)
+    }
+
+
+def _numbers(cells: np.ndarray) -> np.ndarray:
+    """Cells as numbers; NaN where a cell is none."""
+
+    def number(cell: str) -> float:
+        try:
+            return float(cell)
+        except ValueError:
+            return math.nan
+
+    return np.array([number(cell) for cell in cells], dtype=float)
+
+
+def _placed(table: dict[str, np.ndarray], face: FaceModel, file: Path, has_points: bool) -> MarkerLayout:
     """The layout of a table, every marker on its place."""
-    labels = table["marker"].fillna("").str.strip()
-    roles = table["role"].fillna("").str.strip()
+    labels, roles = table["marker"], table["role"]
     if (labels == "").any():
         raise SignfaceError(f"row {int(np.argmax(labels == '')) + 1} names no marker")
     unknown = sorted(set(roles) - set(ROLES))
     if unknown:
         raise SignfaceError(f"unknown role {unknown[0]!r}", hint="a role is face or head")
-    corners = np.full((len(table), 3), -1)
-    barycentric = np.zeros((len(table), 3))
-    if "vertex" in table.columns:
-        vertices = pd.to_numeric(table["vertex"], errors="coerce").to_numpy(float)
+    corners = np.full((len(labels), 3), -1)
+    barycentric = np.zeros((len(labels), 3))
+    if "vertex" in table:
+        vertices = _numbers(table["vertex"])
         given = np.isfinite(vertices)
         wrong = given & ((vertices < 0) | (vertices >= len(face.mesh.vertices)) | (vertices != np.round(vertices)))
         if wrong.any():
@@ -87,7 +112,7 @@ def _placed(table: pd.DataFrame, face: FaceModel, file: Path, has_points: bool) 
         corners[given] = vertices[given, None].astype(int)
         barycentric[given] = (1.0, 0.0, 0.0)
     if has_points:
-        points = table[["x", "y", "z"]].apply(pd.to_numeric, errors="coerce").to_numpy(float)
+        points = np.column_stack([_numbers(table[axis]) for axis in "xyz"])
         given = np.isfinite(points).all(axis=1) & (corners[:, 0] < 0)
         points = points[given] * MILLIMETRES.get(face.unit, 1.0)
         if given.any():
@@ -114,6 +139,8 @@ def write_layout(layout: MarkerLayout, path: str | PathLike[str], face: FaceMode
             point = layout.points(face, [label])[0] * scale
             place = (None, *(round(float(value), 5) for value in point))
         rows.append((label, role, *place))
+    import pandas as pd
+
     table = pd.DataFrame(rows, columns=["marker", "role", "vertex", "x", "y", "z"]).astype({"vertex": "Int64"})
     with whole_file(path) as temporary:
         table.dropna(axis="columns", how="all").to_csv(temporary, index=False)
@@ -130,8 +157,8 @@ def choose_layout(take_labels: Sequence[str], face: FaceModel) -> MarkerLayout:
     bare = {label.rsplit(":", 1)[-1].strip().casefold() for label in take_labels}
     best, fit = None, 0
     for name, file in shipped("layouts", ".csv").items():
-        table = pd.read_csv(file, usecols=["marker", "role"], dtype=str, comment="#")
-        matched = int(table.loc[table["role"] == "face", "marker"].str.casefold().isin(bare).sum())
+        table = _columns(file)
+        matched = sum(label.casefold() in bare for label in table["marker"][table["role"] == "face"])
         if matched > fit:
             best, fit = name, matched
     if best is None or fit < FEWEST:

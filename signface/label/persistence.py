@@ -2,7 +2,6 @@
 
 - `save_model`, `load_model`: write and read a trained classifier.
 - `read_card`: what a file holds, without loading the estimator.
-- `hasten`: make loading quick, on the command line.
 
 A file is the zip archive that skops writes, with one more entry, `signface.json`, the card. Object identities in
 skops' own schema are memory addresses, and zip entries carry the time of day; both are replaced by counters and a
@@ -26,10 +25,10 @@ from signface.errors import SignfaceError
 from signface.files import shipped, whole_file
 from signface.label.labellers import SEQUENCE_NAMES
 from signface.label.model import Card, TrainedModel
+from signface.label.plain_archive import SCHEMA, read_plain
 from signface.label.variants import DescriptorVariant
 
 CARD = "signface.json"
-SCHEMA = "schema.json"
 
 #: What a file holds whose model gives intensities beside labels; others hold the labels' estimator alone.
 LABELS, INTENSITY = "labels", "intensity"
@@ -115,11 +114,18 @@ def read_card(name_or_path: str | PathLike[str]) -> Card:
         ) from error
 
 
-def load_model(name_or_path: str | PathLike[str] = "default") -> TrainedModel:
+def load_model(name_or_path: str | PathLike[str] = "default", *, quickly: bool = False) -> TrainedModel:
     """Read a trained classifier: a shipped one by its name, or a file.
 
-    Nothing of the file is run: it may hold only types that skops trusts and those of `TRUSTED` (after `hasten`, only
-    the latter).
+    Nothing of the file is run: it may hold only types that skops trusts and those of `TRUSTED`.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+    quickly : bool
+        Import skops without its list of the estimators that it trusts by itself, which takes two seconds to make. In
+        this process skops then trusts less, also where others call it: the command line asks for this, and scripts that
+        load other files by skops should not.
 
     Raises
     ------
@@ -132,17 +138,15 @@ def load_model(name_or_path: str | PathLike[str] = "default") -> TrainedModel:
     >>> load_model("default").card.classifier  # doctest: +SKIP
     'forest'
     """
-    import skops.io
-    from skops.io.exceptions import UntrustedTypesFoundException
-
     file = _found(name_or_path)
     card = read_card(file)
     try:
         with zipfile.ZipFile(file) as archive:
             if sum(entry.file_size for entry in archive.infolist()) > LARGEST or archive.testzip() is not None:
                 raise SignfaceError("is no classifier of signface, or is damaged", file=file)
-        data = file.read_bytes()
-        estimator: Any = skops.io.loads(data, trusted=list(TRUSTED))
+            estimator: Any = read_plain(archive)
+        if estimator is None:
+            estimator = _loaded(file, quickly)
         intensity = None
         if isinstance(estimator, dict):
             estimator, intensity = estimator[LABELS], estimator[INTENSITY]
@@ -150,13 +154,6 @@ def load_model(name_or_path: str | PathLike[str] = "default") -> TrainedModel:
         features = int(estimator.n_features_in_)
     except SignfaceError:
         raise
-    except UntrustedTypesFoundException as error:
-        foreign = sorted(set(skops.io.get_untrusted_types(data=data)) - set(TRUSTED))
-        raise SignfaceError(
-            f"holds types that a classifier of signface does not ({', '.join(foreign[:3])}) and was not loaded",
-            file=file,
-            hint="use only files that signface train wrote",
-        ) from error
     except Exception as error:  # a damaged archive makes skops and scikit-learn fail in many ways
         raise SignfaceError(
             f"cannot be loaded as a classifier ({type(error).__name__})",
@@ -173,13 +170,31 @@ def load_model(name_or_path: str | PathLike[str] = "default") -> TrainedModel:
     return TrainedModel(estimator, card, name=file.stem, intensity=intensity)
 
 
-def hasten() -> None:
-    """Make loading quick in a process of our own, by importing skops without what we do not need of it.
+def _loaded(file: Path, quickly: bool) -> Any:
+    """The object in a file, by skops."""
+    if quickly:
+        _hasten()
+    import skops.io
+    from skops.io.exceptions import UntrustedTypesFoundException
+
+    data = file.read_bytes()
+    try:
+        return skops.io.loads(data, trusted=list(TRUSTED))
+    except UntrustedTypesFoundException as error:
+        foreign = sorted(set(skops.io.get_untrusted_types(data=data)) - set(TRUSTED))
+        raise SignfaceError(
+            f"holds types that a classifier of signface does not ({', '.join(foreign[:3])}) and was not loaded",
+            file=file,
+            hint="use only files that signface train wrote",
+        ) from error
+
+
+def _hasten() -> None:
+    """Import skops without its list of everything in scikit-learn.
 
     On import skops lists the estimators of all of scikit-learn, since it trusts them, and imports every module of it
-    to that end: two seconds, and six where PyTorch is installed. After this call it trusts none of them by itself but
-    those of `TRUSTED`. That is too strict for scripts which load other files by skops, so the command line calls it and
-    `load_model` does not.
+    to that end: two seconds, and six where PyTorch is installed. Without the list it trusts none of them by itself, but
+    those of `TRUSTED` when it is told.
     """
     import sklearn.utils
 

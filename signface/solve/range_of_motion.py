@@ -20,7 +20,6 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
@@ -65,6 +64,8 @@ def read_shown(path: str | PathLike[str], names: Sequence[str]) -> list[Shown]:
     SignfaceError
         The file cannot be read, a time is not a number, a window ends before it starts, or a base is unknown.
     """
+    import pandas as pd
+
     try:
         table = pd.read_csv(path, dtype=str, keep_default_na=False)
     except FileNotFoundError:
@@ -201,6 +202,8 @@ def read_signer(path: str | PathLike[str], face: FaceModel, layout: MarkerLayout
         The file is none written by `write_signer`, or knows none of the face's bases at the layout's markers.
     """
     file = Path(path)
+    import pandas as pd
+
     try:
         table = pd.read_csv(file, dtype={"base": str, "marker": str})
         places = table[["x", "y", "z"]].to_numpy(dtype=np.float64)

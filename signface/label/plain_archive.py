@@ -1,0 +1,92 @@
+"""Reading the skops archive of a model that holds nothing but arrays and plain values, without skops.
+
+- `read_plain`: the model, or None where the archive holds anything else, which is then skops' to read.
+
+Importing skops and the modules of scikit-learn that it imports takes half a second or more. A recurrent network needs
+none of them: its archive is a JSON tree of containers, numbers, texts and `.npy` files. Of any other type this reads
+nothing, so that it trusts less than skops does: containers, arrays without objects, and the classes of `OURS`.
+"""
+
+from __future__ import annotations
+
+import importlib
+import io
+import json
+import zipfile
+from typing import Any
+
+import numpy as np
+
+SCHEMA = "schema.json"
+
+#: The protocol of the archives that are known here; newer ones may mean something else.
+PROTOCOL = 2
+
+#: Models that consist of arrays and plain values.
+OURS = ("signface.label.crf.ChainLabeller", "signface.label.gru.RecurrentLabeller")
+
+CONTAINERS = {"ListNode": list, "TupleNode": tuple}
+KEYS = {"builtins.str": str, "builtins.int": int}
+
+
+class _OtherError(Exception):
+    """The archive holds something that is not plain."""
+
+
+def read_plain(archive: zipfile.ZipFile) -> Any:
+    """The object in a skops archive; None where it is not one of `OURS`, of arrays and plain values alone.
+
+    Raises
+    ------
+    Exception
+        Of any kind, where the archive is damaged.
+    """
+    schema = json.loads(archive.read(SCHEMA))
+    name = _name(schema)
+    if schema.get("protocol") != PROTOCOL or schema.get("__loader__") != "ObjectNode" or name not in OURS:
+        return None
+    try:
+        state = _value(schema["content"], archive, {})
+    except _OtherError:
+        return None
+    if not isinstance(state, dict):
+        return None
+    module, _, kind = name.rpartition(".")
+    own = getattr(importlib.import_module(module), kind)
+    model = own.__new__(own)
+    model.__dict__.update(state)
+    return model
+
+
+def _name(node: dict[str, Any]) -> str:
+    return f"{node['__module__']}.{node['__class__']}"
+
+
+def _value(node: dict[str, Any], archive: zipfile.ZipFile, known: dict[int, Any]) -> Any:
+    """What a node of the tree stands for; what was met before under the same number is the same object."""
+    number = node.get("__id__")
+    if number in known:
+        return known[number]
+    loader, name = node["__loader__"], _name(node)
+    value: Any
+    if loader == "JsonNode" and name == "builtins.str":
+        value = json.loads(node["content"])
+    elif loader in CONTAINERS and name == f"builtins.{CONTAINERS[loader].__name__}":
+        value = CONTAINERS[loader](_value(own, archive, known) for own in node["content"])
+    elif loader == "DictNode" and name == "builtins.dict":
+        keys = [KEYS.get(_name(own)) for own in node["key_types"]["content"]]
+        if None in keys:
+            raise _OtherError
+        entries = zip(keys, node["content"].items(), strict=True)
+        value = {kind(key): _value(own, archive, known) for kind, (key, own) in entries if kind is not None}
+    elif loader == "NdArrayNode" and node["type"] == "numpy" and name.startswith("numpy."):
+        value = np.load(io.BytesIO(archive.read(node["file"])), allow_pickle=False)
+        if name != "numpy.ndarray":
+            value = value[()]
+            if f"{type(value).__module__}.{type(value).__name__}" != name:
+                raise _OtherError
+    else:
+        raise _OtherError
+    if number is not None:
+        known[number] = value
+    return value
