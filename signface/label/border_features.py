@@ -68,32 +68,35 @@ def border_features(descriptors: Descriptors, times: np.ndarray) -> np.ndarray:
     everything = list(range(weights.shape[1]))
     expressive = [i for region, columns in regions.items() if region not in BUSY for i in columns]
     groups = [columns or everything for columns in (*regions.values(), expressive, everything)]
-    time = times - descriptors.start
-    return np.stack(
-        [curve for columns in groups for curve in _curves(Means(weights[:, columns], descriptors.rate), time)], axis=1
-    )
+    members = np.zeros((weights.shape[1], len(groups)))
+    for place, columns in enumerate(groups):
+        members[columns, place] = 1.0
+    curves = _curves(Means(weights, descriptors.rate), times - descriptors.start, members)
+    return np.stack(curves, axis=2).reshape(len(times), -1)
 
 
-def _curves(means: Means, time: np.ndarray) -> list[np.ndarray]:
-    """The features of one group of bases, each (K,)."""
+def _curves(means: Means, time: np.ndarray, members: np.ndarray) -> list[np.ndarray]:
+    """The features of groups of bases, each (K, G); (N, G) `members` are 1 where a base belongs to a group."""
+
+    def length(change: np.ndarray) -> np.ndarray:
+        return np.sqrt(change**2 @ members)
+
     here = means.between(time - 0.03, time + 0.03)
     curves = []
     for near, far in WINDOWS_S:
-        change = means.between(time + near, time + far) - means.between(time - far, time - near)
-        curves.append(np.linalg.norm(change, axis=1))
+        curves.append(length(means.between(time + near, time + far) - means.between(time - far, time - near)))
     for neighbour in (means.between(time - 0.16, time - 0.04), means.between(time + 0.04, time + 0.16)):
-        curves.append(np.linalg.norm(neighbour - here, axis=1))
+        curves.append(length(neighbour - here))
     for reach in REACHES_S:
         before = means.between(time - reach - 0.1, time - reach)
         way = means.between(time + reach, time + reach + 0.1) - before
-        length = np.linalg.norm(way, axis=1)
-        curves += [((here - before) * way).sum(axis=1) / (length**2 + LITTLE**2), length]
+        far_off = length(way)
+        curves += [((here - before) * way) @ members / (far_off**2 + LITTLE**2), far_off]
     step = 0.06
     speed = np.stack(
         [
-            np.linalg.norm(
-                means.between(time + moment, time + moment + step) - means.between(time + moment - step, time + moment),
-                axis=1,
+            length(
+                means.between(time + moment, time + moment + step) - means.between(time + moment - step, time + moment)
             )
             / step
             for moment in MOMENTS_S
