@@ -29,7 +29,7 @@ SEQUENCE_NAMES = {
     "forest-viterbi": "random forest on frames, decoded by Viterbi's algorithm through a transition state",
     "hmm": "hidden Markov model with Gaussian frames",
     "crf": "linear-chain conditional random field",
-    "gru": "recurrent network, decoded by a hidden semi-Markov model (extra deep)",
+    "gru": "recurrent network, decoded by a hidden semi-Markov model",
 }
 
 
