@@ -17,7 +17,7 @@ from signface.descriptors import Descriptors
 from signface.face.reading import read_face
 from signface.label.vocabulary import AFFECTS
 from signface.report.evaluation_report import Evaluated, draw_all, write_report
-from signface.report.evaluation_words import headline, limits
+from signface.report.evaluation_words import headline, limits, training_words
 from signface.report.importance_figure import draw_importance, skin_values
 from signface.segment.segments import Segments
 from tests.hand_made import corpus
@@ -226,6 +226,13 @@ def test_skin_is_painted_where_the_bases_that_matter_move_it():
     jaw = np.linalg.norm(face.bases[face.names.index("jawOpen")], axis=1)
     assert values[jaw.argmax()] < 0.05  # what matters less than nothing is not painted
     assert len(draw_importance(table, face, title="x").axes) > len(draw_importance(table, None, title="x").axes)
+
+
+def test_how_it_was_trained_is_said_where_it_is_not_as_in_the_thesis():
+    assert training_words({"features": ["weights"], "normalise": "none", "search": False}) == ""
+    said = training_words({"features": ["weights", "windows"], "normalise": "signer", "search": True})
+    assert said.startswith("Classifiers of segments saw weights and windows;")
+    assert "searched within the training takes" in said
 
 
 def test_labels_are_spelt_out(page):

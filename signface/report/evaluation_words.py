@@ -2,7 +2,7 @@
 
 - `headline`: the main result in two or three sentences.
 - `limits`: what the numbers do not show.
-- `protocol_words`: what was trained on and tested, in plain words.
+- `protocol_words`, `training_words`: what was trained on and tested, and how, in plain words.
 - `READING`: how the measures are read.
 """
 
@@ -184,6 +184,32 @@ def protocol_words(protocol: Mapping[str, Any]) -> str:
         f"Each signer in turn was left out: a classifier was trained on the {train} of all other signers and tested on "
         f"the {test} of the one left out, of whom it has seen nothing."
     )
+
+
+def training_words(training: Mapping[str, Any]) -> str:
+    """How classifiers were trained, where that is not as in the thesis; empty where it is.
+
+    Parameters
+    ----------
+    training : mapping
+        The entry `training` of a protocol: what `signface.label.training.train_model` was told.
+    """
+    words = []
+    features = list(training.get("features", ["weights"]))
+    if features != ["weights"]:
+        words.append(f"classifiers of segments saw {' and '.join(features)}")
+    if training.get("normalise") == "signer":
+        words.append("each signer’s weights were taken less their mean and over their spread")
+    if training.get("aggregate") == "frames":
+        words.append("a segment’s label is what all of its frames say, not its mean")
+    if training.get("balanced"):
+        words.append("every label weighed the same in training")
+    if training.get("search"):
+        words.append("parameters were searched within the training takes")
+    if training.get("calibrate"):
+        words.append("confidences were calibrated on training takes left out")
+    text = "; ".join(words)
+    return f"{text[0].upper()}{text[1:]}." if text else ""
 
 
 def classifier_words(names: Mapping[str, Any]) -> list[tuple[str, str]]:
