@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import pandas as pd
 from sklearn.base import BaseEstimator
 
 from signface.descriptors import Descriptors
@@ -106,6 +105,8 @@ class TakeLabeller(BaseEstimator):
         The confidence of a stable segment is the mean probability of its label among the labels over its frames, that
         of a transition the product of its neighbours'.
         """
+        import pandas as pd
+
         among, course = self.find(take)
         step = take.duration / len(among)
         kept = [(first, last, code, float(among[first:last, code].mean())) for first, last, code in course[::2]]
