@@ -13,6 +13,7 @@ import sys
 from collections.abc import Sequence
 
 from signface.errors import SignfaceError
+from signface.solve.compiling import on_compiling
 
 #: command: what it does, in a line. The module has the same name.
 COMMANDS = {
@@ -74,6 +75,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if arguments.command is None:
         parser.print_help()
         return 0
+    on_compiling(_say_why_it_takes_long)
     try:
         return arguments.run(arguments) or 0
     except SignfaceError as error:
@@ -85,6 +87,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # `signface ... | head` is no defect
         return 0
+
+
+def _say_why_it_takes_long(once: bool) -> None:
+    often = "once" if once else "every time, as no folder can be written to keep it in: set NUMBA_CACHE_DIR to one"
+    print(f"signface: preparing the solver for this machine, {often} (a few seconds)", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

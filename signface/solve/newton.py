@@ -26,7 +26,6 @@ entries. Each matrix is padded with weights that nothing moves, so that its rows
 
 from __future__ import annotations
 
-import contextlib
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -34,7 +33,9 @@ from math import exp, inf, isfinite, log1p, sqrt
 
 import numba
 import numpy as np
+from numba.core import event
 
+from signface.solve import compiling
 from signface.solve.bounds import (
     AT_REST,
     KNEE,
@@ -61,14 +62,18 @@ OFF = 0.2
 RENEW = 256
 #: The kept inverse is made anew, too, when a correction would leave this share of a curvature: the rest has cancelled.
 CANCELLED = 1e-4
-#: Up to this distance outside 0 to 1 the exponential is summed as a series, without a call.
-NEAR = SMOOTHING / 4
+#: Up to so many smoothings outside 0 to 1 the exponential is summed as a series, without a call.
+NEAR = 0.25
 #: Frames taken together: what they need then stays in the processor's cache from one loop to the next.
 BLOCK = 256
 #: Weights are padded to a multiple of this: two vector registers of eight.
 PADDING = 16
 #: Frames under which a second thread costs more than it gives.
 FRAMES_PER_THREAD = 1024
+
+
+#: The loops for which there is no folder to keep them in.
+_unkept: list[str] = []
 
 
 def _compiled(function: Callable) -> Callable:
@@ -79,9 +84,27 @@ def _compiled(function: Callable) -> Callable:
     """
     make = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
     made = make(function)
-    with contextlib.suppress(RuntimeError, AttributeError):  # no folder can be written; NUMBA_DISABLE_JIT is set
+    try:
         made.enable_caching()
+    except RuntimeError:
+        _unkept.append(function.__name__)
+    except AttributeError:  # NUMBA_DISABLE_JIT is set: there is nothing to keep
+        pass
     return made
+
+
+class _Teller(event.Listener):
+    """Says that the loops are about to be compiled (`signface.solve.compiling`)."""
+
+    def on_start(self, event: event.Event) -> None:
+        if event.data["dispatcher"].py_func.__module__ == __name__:
+            compiling.tell(once=not _unkept)
+
+    def on_end(self, event: event.Event) -> None:
+        """Nothing is said of the end."""
+
+
+event.register("numba:compile", _Teller())
 
 
 @_compiled
@@ -138,17 +161,20 @@ def _correct(inverse, i, change, row):
 
 
 @_compiled
-def _follow(right, quad, free, stiffness, pull, tolerance, inverse, state, which, age, solved, steps):
+def _follow(
+    right, quad, free, stiffness, smoothing, pull, knee, tolerance, inverse, state, which, age, solved, steps
+):  # fmt: skip
     """Solve frames one after the other: `2 A c - right[f] + H'(c) = 0`.
 
     `state` and `inverse` carry over what the next call starts from: the weights in `state[0]`, the slopes taken, and
     the inverse for those; `age` is for how many frames it has been corrected, and is returned. `steps` counts a frame's
     steps, or becomes -1 where `right` has a NaN, -2 where no optimum was reached; a frame that is -2 is left out.
+    What numba keeps on disk it renews when this file changes, so that constants of other modules are arguments.
     """
     n = len(quad)
-    knee = KNEE if pull > 0.0 else 0.0
-    lean = pull / KNEE
-    stiff = stiffness / SMOOTHING
+    lean = pull / knee if knee > 0.0 else 0.0
+    stiff = stiffness / smoothing
+    near = NEAR * smoothing
     # Slopes are taken to be `taken + curve * (c - weight)` around the weights `weight`; `true` and `bend` are the
     # slopes and curvatures there. `balance` is 2 A weight.
     weight, curve, taken, true, bend = state[0], state[1], state[2], state[3], state[4]
@@ -221,7 +247,7 @@ def _follow(right, quad, free, stiffness, pull, tolerance, inverse, state, which
                 for i in range(n):
                     farthest = max(farthest, beyond[i])
                 for i in range(n):  # exp(x) - 1
-                    x = min(beyond[i], NEAR) / SMOOTHING
+                    x = min(beyond[i], near) / smoothing
                     series = 1 + x / 5 * (1 + x / 6 * (1 + x / 7 * (1 + x / 8 * (1 + x / 9))))
                     beyond[i] = x * (1 + x / 2 * (1 + x / 3 * (1 + x / 4 * series)))
                 for i in range(n):
@@ -232,21 +258,21 @@ def _follow(right, quad, free, stiffness, pull, tolerance, inverse, state, which
                     inside = lean if weight[i] < knee else 0.0
                     held = stiff * (beyond[i] + 1.0)
                     bend[i] = held if weight[i] < 0.0 or weight[i] > 1.0 else inside
-                if farthest > NEAR and stiffness > 0.0:
+                if farthest > near and stiffness > 0.0:
                     for i in range(n):
                         far = -weight[i] if weight[i] < 0.0 else weight[i] - 1.0
-                        if far <= NEAR:
+                        if far <= near:
                             continue
                         # Far outside, the exponential would throw the next step away. It is linearised no further out
                         # than where its slope is what the last step took it to be, or one smoothing.
                         force = -taken[i] if weight[i] < 0.0 else taken[i] - pull
-                        x = min(far, SMOOTHING * log1p(force / stiffness) if force > 0.0 else SMOOTHING)
-                        if far - x > 0.01 * SMOOTHING:
+                        x = min(far, smoothing * log1p(force / stiffness) if force > 0.0 else smoothing)
+                        if far - x > 0.01 * smoothing:
                             farthest = inf
                         else:
                             x = far
-                        bend[i] = stiff * exp(x / SMOOTHING)
-                        held = bend[i] * SMOOTHING - stiffness + bend[i] * (far - x)
+                        bend[i] = stiff * exp(x / smoothing)
+                        held = bend[i] * smoothing - stiffness + bend[i] * (far - x)
                         true[i] = -held if weight[i] < 0.0 else pull + held
                 total, before, after = 0.0, 0.0, 0.0
                 for i in range(n):
@@ -389,7 +415,7 @@ class Problem:
                 if turn == 1:
                     right += pull * released(solved)
                 ages[turn] = _follow(
-                    right, self._quad, self._free, stiffness, pull, tolerance,
+                    right, self._quad, self._free, stiffness, SMOOTHING, pull, KNEE if pull > 0.0 else 0.0, tolerance,
                     inverses[turn], states[turn], which, ages[turn], solved, done,
                 )  # fmt: skip
             _products(solved, self._bases, placed)
