@@ -25,8 +25,11 @@ from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.files import whole_file
-from signface.solve.calibration import PRIOR, calibrate
+from signface.solve.calibration import calibrate
 
+#: What the avatar's bases count beside those shown, see `signface.solve.calibration.calibrate`: twice as much as where
+#: strengths are known.
+PRIOR = 1e-3
 #: Rounds of strengths and bases.
 ROUNDS = 3
 #: A base may have been shown up to this weight.
