@@ -8,7 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.base import clone
 
-from signface.descriptors import Descriptors
+from signface.cli.main import main
+from signface.descriptors import Descriptors, read_weights, write_weights
+from signface.elan.reference import read_reference
 from signface.errors import SignfaceError
 from signface.evaluate.protocol import evaluate, folds_of
 from signface.label.labelling import find_segments, label_spans
@@ -143,3 +145,23 @@ def test_an_evaluation_normalises_signers_by_their_test_takes():
     _, sure = label_spans(tested.descriptors, spans, model, level=level)
     assert table.loc[table["take"] == tested.take, "confidence"].tolist() == sure
     assert sure != label_spans(tested.descriptors, spans, model)[1]
+
+
+def test_annotate_normalises_by_all_takes_that_it_is_given(tmp_path):
+    takes = [e for e in corpus() if e.kind == "IE"]
+    save_model(train_model(takes, classifier="forest", normalise="signer"), tmp_path / "m.skops")
+    unseen = [
+        example(labels, seed=n, take=f"t{n}") for n, labels in enumerate((["N", "J", "N"], ["N", "A", "N", "Su"]))
+    ]
+    files = [tmp_path / f"{e.take}.csv" for e in unseen]
+    for e, file in zip(unseen, files, strict=True):
+        write_weights(e.descriptors, file)
+    call = ["annotate", *map(str, files), "-o", str(tmp_path / "out"), "--classifier", str(tmp_path / "m.skops")]
+    assert main(call) == 0
+    read = [read_weights(file) for file in files]
+    level = signer_level(read)
+    for take in read:
+        wanted = find_segments(take, load_model(tmp_path / "m.skops"), level=level).table
+        written = read_reference(tmp_path / "out" / f"{take.name}.eaf").table
+        assert written["label"].tolist() == wanted["label"].tolist()
+        np.testing.assert_allclose(written["start_s"], wanted["start_s"], atol=0.001)
