@@ -30,11 +30,8 @@ from signface.label.training import Example, train_model
 from signface.label.vocabulary import AFFECTS
 
 FOLDER = Path(__file__).resolve().parent / "classifiers"
-#: name: classifier, its parameters, and kinds of takes that it is trained on.
-SHIPPED = {
-    "default": ("gru", {"networks": 4}, ["IE", "SE", "EU"]),
-    "thesis-forest": ("forest", {}, ["IE", "SE"]),
-}
+#: name: classifier and kinds of takes that it is trained on.
+SHIPPED = {"default": ("gru", ["IE", "SE", "EU"]), "thesis-forest": ("forest", ["IE", "SE"])}
 TEST_KINDS = ["EU"]
 SCORED = {
     "manual_segments": "accuracy on EU reference segments, unseen signers",
@@ -71,11 +68,10 @@ def build(name: str, train: list[Example], test: list[Example]) -> None:
     train, test : list of Example
         Solved takes of the two corpora.
     """
-    classifier, parameters, kinds = SHIPPED[name]
+    classifier, kinds = SHIPPED[name]
     model = train_model(
         [example for example in train if example.kind in kinds],
         classifier=classifier,
-        parameters=parameters,
         face="default",
         layout="default-40",
         corpus="synthetic (signface synth)",

@@ -30,7 +30,7 @@ def takes():
 
 @pytest.fixture(scope="module", params=list(SEQUENCE_NAMES))
 def model(request, takes):
-    quick = {"gru": {"networks": 1}}
+    quick = {"gru": {"networks": 1, "effort": 90.0}}
     return train_model(
         [e for e in takes if e.signer == "S1"], classifier=request.param, parameters=quick.get(request.param)
     )

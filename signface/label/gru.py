@@ -79,7 +79,7 @@ class RecurrentLabeller(TakeLabeller):
         *,
         networks: int = 2,
         units: int = 64,
-        effort: float = 110.0,
+        effort: float = 150.0,
         batch: int = 32,
         stretch: int = 128,
         rate: float = 3e-3,
