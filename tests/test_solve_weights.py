@@ -16,7 +16,8 @@ from signface.face.mesh import Mesh
 from signface.face.model import FaceModel
 from signface.face.reading import read_face
 from signface.face.subdivision import subdivide
-from signface.solve.bounds import holding_curvature, holding_energy, holding_slope, released
+from signface.solve.bounds import AT_REST, SMOOTHING, holding_curvature, holding_energy, holding_slope, released
+from signface.solve.compiling import on_compiling, tell
 from signface.solve.methods import METHODS, make_solver
 from signface.solve.newton import Problem, minimise, minimise_damped
 from signface.solve.thin_shell import ThinShellSolver
@@ -197,6 +198,38 @@ def test_the_quick_and_the_sure_method_agree_on_wild_frames():
 
         assert np.abs(energy(quick) - energy(sure)).max() < 1e-9
         assert residual == pytest.approx(np.sqrt(((quick - right) ** 2).sum(axis=1) / 10))
+
+
+@pytest.mark.parametrize("scale", [1.0, 5.0])
+def test_no_frame_is_too_far_from_the_one_before_for_the_quick_method(solver, displacements, scale):
+    """The quick method says of each frame how many steps it took, or that it gave up (-2)."""
+    rows = scale * np.tile(displacements.reshape(len(displacements), -1), (5, 1))
+    rows = rows[np.random.default_rng(3).permutation(len(rows))]
+    pull = solver.holding * solver.sparsity
+    stiffness = solver.holding * AT_REST / SMOOTHING
+    for frames in (rows, *rows[:60, None]):
+        steps = solver._whole.solve(frames, None, stiffness, pull, True, 1e-9)[3]
+        assert (steps > 0).all()
+
+
+def test_rounding_does_not_gather_over_a_long_take(face, layout, solver):
+    """The kept inverse is corrected thousands of times; the first frame, solved again at the end, is still the same."""
+    rng = np.random.default_rng(5)
+    path = np.cumsum(rng.normal(0.0, 0.05, (3000, face.n_bases)), axis=0)
+    moved = np.tensordot(np.clip(np.sin(path) ** 2 - 0.4, 0.0, 1.0), layout.bases(face), axes=1)
+    moved[-1] = moved[0]
+    one = ThinShellSolver(face, layout, threads=1)
+    weights = one.solve(moved).weights
+    assert np.abs(weights[-1] - weights[0]).max() < 1e-7
+    assert np.abs(weights[1500] - solver.solve(moved[1500:1501]).weights[0]).max() < 1e-7
+
+
+def test_whoever_asks_is_told_once_that_the_solver_is_compiled():
+    heard: list[bool] = []
+    on_compiling(heard.append)
+    tell(once=True)
+    tell(once=True)
+    assert heard == [True]
 
 
 @given(st.floats(-1.0, 2.0), st.floats(0.0, 0.1))

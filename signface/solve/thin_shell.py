@@ -202,7 +202,11 @@ class ThinShellSolver:
             some, present = self.markers.checked(displacements[left])
             weights[left] = np.nan
             for pattern, frames in presence_patterns(present):
-                weights[left[frames]], residual[left[frames]] = self._minimise(some[frames], self._problem(pattern))
+                before = weights[max(left[frames[0]] - 1, 0), self._whole.places]
+                first = before if np.isfinite(before).all() else None
+                weights[left[frames]], residual[left[frames]] = self._minimise(
+                    some[frames], self._problem(pattern), first
+                )
         return Solution(weights, residual)
 
     def _minimise(
