@@ -100,7 +100,7 @@ def _general_optimiser(solver: ThinShellSolver, frames: np.ndarray) -> tuple[dic
         return energy(c, right), slope
 
     rest = np.zeros_like(rights)
-    tight = {"ftol": 1e-12, "gtol": 1e-8}
+    tight = {"ftol": 1e-10, "gtol": 1e-6}
     ways = {
         "L-BFGS-B, gradient given": (both, True, rest, {}),
         "L-BFGS-B, gradient given, to 1e-6": (both, True, rest, tight),
