@@ -31,6 +31,9 @@ BARS = {"manual_segments": ("#0072b2", ""), "automatic_segments": ("#e69f00", "/
 #: Points of a timeline's curves per second in a page that holds many.
 CURVE_RATE = 40.0
 
+#: Segments that a share must be counted from to be drawn.
+LEAST_BIN = 5
+
 #: Letters of a name that figures have room for.
 LONGEST_NAME = 18
 
@@ -251,7 +254,7 @@ def draw_reliability(curves: Mapping[str, Sequence[Mapping[str, float]]]) -> Fig
         panel = figure.subplots()
         panel.plot([0, 1], [0, 1], color="#999999", linewidth=1, linestyle="--")
         for number, (name, bins) in enumerate(curves.items()):
-            kept = [own for own in bins if own["n"]]
+            kept = [own for own in bins if own["n"] >= LEAST_BIN]
             panel.plot(
                 [own["confidence"] for own in kept],
                 [own["accuracy"] for own in kept],

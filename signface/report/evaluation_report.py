@@ -252,7 +252,8 @@ def draw_all(evaluated: Evaluated) -> dict[str, list[Drawn]]:
                 figures.draw_reliability(curves),
                 "Lines: share of automatic segments that are right, against the confidence of the classifier.",
                 f"Share of automatic segments that are right against their confidence, {tables.PROTOCOL_TITLES[main]}. "
-                "On the dashed line a confidence means what it says; below it, it promises too much.",
+                "On the dashed line a confidence means what it says; below it, it promises too much. "
+                f"Shares of fewer than {figures.LEAST_BIN} segments are not drawn.",
             )
         )
     points = [pd.DataFrame(own).assign(protocol=protocol) for protocol, own in metrics["learning_curve"].items() if own]

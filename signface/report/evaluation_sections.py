@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from signface.label.labellers import SEQUENCE_NAMES
 from signface.label.vocabulary import AFFECTS
 from signface.report import evaluation_tables as tables
 from signface.report import evaluation_words as words
@@ -51,6 +52,11 @@ def labels(evaluated: Evaluated) -> Content:
         "Manual segments are the annotator’s: only the label is asked. On automatic segments, errors of the "
         "segmentation are added to those of the label. Frames are the whole annotation, transitions included."
     ]
+    if any(name in SEQUENCE_NAMES for name in evaluated.metrics["classifiers"]):
+        paragraphs.append(
+            "Sequence models find segments of their own: on automatic segments they are not asked the same "
+            "questions as the others. Compare them on frames."
+        )
     return paragraphs, shown
 
 
@@ -136,10 +142,9 @@ def comparison(evaluated: Evaluated) -> Content:
     """McNemar's test of each two classifiers."""
     shown = [
         page_table(
-            tables.mcnemar_table(part["mcnemar"]),
+            tables.mcnemar_table(part["mcnemar"]).assign(p=[_probability(pair["p"]) for pair in part["mcnemar"]]),
             f"mcnemar-{protocol}",
             f"McNemar’s test on manual segments, {tables.PROTOCOL_TITLES.get(protocol, protocol)}",
-            decimals={"p": 4},
         )
         for protocol, part in evaluated.parts.items()
         if part["mcnemar"]
@@ -276,6 +281,10 @@ def importance(evaluated: Evaluated) -> Content:
             f"Not asked of {', '.join(without)}: what does not label a segment by its mean weights has no such answer."
         )
     return paragraphs, shown
+
+
+def _probability(p: float) -> str:
+    return "< 0.0001" if p < 0.0001 else f"{p:.4f}"
 
 
 def _interval(low: float | None, high: float | None) -> str:

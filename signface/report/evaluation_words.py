@@ -149,7 +149,7 @@ def limits(metrics: Mapping[str, Any], facts: Mapping[str, Any]) -> list[str]:
     )
     if len(metrics["classifiers"]) > 1:
         words.append(
-            f"“{favourite(metrics['classifiers'])}” is named because it did best here among "
+            f"“{favourite(metrics['classifiers'])}” is named because it was right most of the time here among "
             f"{_number(len(metrics['classifiers']))} classifiers, on the very takes that it is reported on: expect a "
             "little less on new ones."
         )
