@@ -51,7 +51,7 @@ HEAD_SLACK = 0.3
 #: harder than one at that distance (1.3 mm on the default face).
 SLIP = 0.4
 #: The length of the gradient at which a frame counts as solved. Energies are of the order of 1.
-GRADIENT = 1e-9
+GRADIENT = 1e-8
 #: Frames solved at a time, so that a long take needs little memory.
 CHUNK = 16384
 
