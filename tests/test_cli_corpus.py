@@ -122,15 +122,11 @@ def test_evaluate_writes_and_prints_both_kinds_of_signer(folder, tmp_path, capsy
     assert frames.tolist() == across["classifiers"]["knn1"]["frames"]["confusion"]
 
 
-def test_the_report_needs_nothing_outside_itself_and_is_the_same_each_time(folder, tmp_path):
-    pages = []
-    for name in ("one", "other"):
-        out = tmp_path / name
-        options = ["--train-kinds", "IE", "--protocol", "within", "--classifiers", "knn1"]
-        assert main(["evaluate", str(folder), "-o", str(out), *options]) == 0
-        pages.append((out / "report.html").read_bytes())
-    assert pages[0] == pages[1]
-    page = pages[0].decode()
+def test_the_report_needs_nothing_outside_itself(folder, tmp_path):
+    options = ["--train-kinds", "IE", "--protocol", "within", "--classifiers", "knn1", "--date", "some day"]
+    assert main(["evaluate", str(folder), "-o", str(tmp_path / "out"), *options]) == 0
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "some day" in page
     assert "<svg" in page
     assert 'src="http' not in page
     assert "signer not trained on" not in page
