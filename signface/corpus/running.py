@@ -243,7 +243,8 @@ def _writing(options: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
             digest.update(absolute["template"].read_bytes())
         except OSError as error:
             raise SignfaceError(f"cannot be read ({error.strerror})", file=template) from error
-    digest.update(repr(sorted((key, value) for key, value in options.items() if key != "template")).encode())
+    said = {key: value for key, value in options.items() if value is not None and key != "template"}
+    digest.update(repr(sorted(said.items())).encode())
     return absolute, digest.hexdigest()
 
 
