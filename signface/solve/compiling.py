@@ -1,6 +1,6 @@
 """Word that the solver is being compiled: the one wait of some seconds that a user meets, once on a machine.
 
-Kept apart from `signface.solve.newton` so that a command can ask to be told without importing numba.
+Kept apart from `signface.solve.loops` so that a command can ask to be told without importing numba.
 """
 
 from __future__ import annotations
