@@ -18,6 +18,7 @@ from signface.cli.options import (
     writing_options,
 )
 from signface.cli.progress import progress
+from signface.cli.threads import one_thread_for_matrices
 from signface.errors import SignfaceError
 
 if TYPE_CHECKING:
@@ -59,6 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Annotate every take; those that cannot be are named, and the others still are."""
+    one_thread_for_matrices()
     takes = arguments.takes
     if arguments.video is not None and len(takes) > 1:
         raise SignfaceError("--video belongs to one take", hint="annotate the takes one by one")

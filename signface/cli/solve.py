@@ -10,6 +10,7 @@ from pathlib import Path
 
 from signface.cli.options import add_solve_arguments, output_files, read_face_and_layout, solve_options
 from signface.cli.progress import progress
+from signface.cli.threads import one_thread_for_matrices
 from signface.errors import SignfaceError
 
 EXAMPLE = """  signface solve take.c3d -o weights.csv
@@ -35,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Solve every take; those that cannot be are named, and the others still are."""
+    one_thread_for_matrices()
     import numpy as np
 
     from signface.annotation import describe_pieces, median_known
