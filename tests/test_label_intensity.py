@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from sklearn.base import clone
 from sklearn.linear_model import LogisticRegression
 from sklearn.metrics import cohen_kappa_score
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 
 from signface.annotation import annotate
 from signface.cli.main import main
@@ -21,7 +23,9 @@ from signface.elan.export import write_eaf
 from signface.elan.reference import read_reference
 from signface.evaluate.protocol import evaluate, folds_of
 from signface.label.examples import Example
-from signface.label.intensity import INTENSITIES, OrdinalClassifier, ordinal_metrics, train_intensity
+from signface.label.intensity import INTENSITIES, train_intensity
+from signface.label.labelling import segment_means
+from signface.label.ordinal import OrdinalClassifier, ordinal_metrics
 from signface.label.persistence import load_model, save_model
 from signface.label.training import train_model
 from signface.segment.segments import Segments
@@ -89,6 +93,23 @@ def test_intensities_of_takes_not_trained_on_are_found(takes):
     expressed = (found["kind"] == "stable") & (found["label"] != "N")
     assert found.loc[expressed, "intensity"].tolist() == unseen.reference.table.loc[expressed, "intensity"].tolist()
     assert found.loc[~expressed, "intensity"].isna().all()
+
+
+def test_the_lines_kept_say_what_the_classifiers_behind_them_say(takes):
+    model = train_intensity(takes)
+    rows, levels = [], []
+    for take in takes:
+        table = take.stable[take.stable["label"] != "N"]
+        rows.append(
+            np.linalg.norm(segment_means(take.descriptors, table[["start_s", "end_s"]].to_numpy(float)), axis=1)
+        )
+        levels.append(table["intensity"].to_numpy(int))
+    X, y = np.concatenate(rows)[:, None], np.concatenate(levels)
+    whole = OrdinalClassifier(make_pipeline(StandardScaler(), LogisticRegression(max_iter=500))).fit(X, y)
+    odds = X * model.lines_[:, 0] + model.lines_[:, 1]
+    for step, line in zip(whole.steps_, odds.T, strict=True):
+        np.testing.assert_allclose(step.decision_function(X), line, atol=1e-9)
+    np.testing.assert_array_equal(model.levels_, whole.classes_)
 
 
 def test_without_enough_intensities_there_is_none_to_learn(takes):

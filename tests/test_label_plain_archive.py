@@ -12,6 +12,7 @@ import skops.io
 from sklearn.linear_model import LinearRegression
 
 from signface.label.crf import ChainLabeller
+from signface.label.intensity import IntensityClassifier
 from signface.label.plain_archive import SCHEMA, read_plain
 
 
@@ -48,6 +49,16 @@ def test_a_model_of_arrays_is_read_as_skops_reads_it():
     np.testing.assert_array_equal(read.weights_["left"][0], same.weights_["left"][0])
     assert type(read.weights_["left"][1]) is np.float32
     assert read.weights_["right"] == same.weights_["right"] == {1: None, 2: True}
+
+
+def test_labels_and_intensities_are_read_together():
+    intensity = IntensityClassifier()
+    intensity.bases_, intensity.levels_ = ("a", "b"), np.array([1, 2, 3])
+    intensity.lines_ = np.array([[2.0, -1.0], [2.0, -3.0]])
+    read = read_plain(archive({"labels": model(), "intensity": intensity}))
+    assert type(read["labels"]) is ChainLabeller
+    assert type(read["intensity"]) is IntensityClassifier
+    np.testing.assert_array_equal(read["intensity"].lines_, intensity.lines_)
 
 
 def rename(kind, module):

@@ -358,7 +358,7 @@ def _recognise(xml: bytes) -> None:
     recording = read_recording(Path(chosen["take"]))
     face = read_face(chosen.get("face", "default"))
     layout = read_layout(chosen["layout"], face) if "layout" in chosen else None
-    model = load_model(chosen.get("classifier", "default"))
+    model = load_model(chosen.get("classifier", "default"), quickly=True)
     print(progress_line(0.2, "solving"), flush=True)
     found = annotate(recording, model=model, face=face, layout=layout, neutral=neutral)
     print(progress_line(0.9, "writing"), flush=True)

@@ -24,10 +24,11 @@ from signface.label.calibration import brier_score, expected_calibration_error
 from signface.label.channels import find_intensities
 from signface.label.examples import Example, signer_levels
 from signface.label.folds import groups_of, inner_folds
-from signface.label.intensity import IntensityClassifier, ordinal_metrics
+from signface.label.intensity import IntensityClassifier
 from signface.label.labellers import NAMES
 from signface.label.labelling import find_segments, label_segments, label_spans
 from signface.label.model import TrainedModel
+from signface.label.ordinal import ordinal_metrics
 from signface.label.training import train_model
 from signface.label.variants import SignerLevel
 from signface.label.vocabulary import AFFECTS

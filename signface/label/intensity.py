@@ -1,25 +1,26 @@
 """Intensity of an expression, 1 to 3, learnt from annotations: an ordinal classification beside the label.
 
-- `OrdinalClassifier`: ordered classes by any classifier of scikit-learn that gives probabilities.
 - `IntensityClassifier`: the intensity of stable segments, from how far the face is from rest.
 - `train_intensity`: one trained on annotated takes, where their intensity is annotated.
-- `ordinal_metrics`: how well intensities agree.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from sklearn.base import BaseEstimator, ClassifierMixin, clone
 
 from signface.descriptors import Descriptors
 from signface.label.examples import Example, common_bases
 from signface.label.labelling import segment_means
 from signface.label.vocabulary import AFFECTS
 from signface.segment.segments import Segments
+
+if TYPE_CHECKING:
+    from sklearn.linear_model import LogisticRegression
+    from sklearn.preprocessing import StandardScaler
 
 #: The intensities there are.
 INTENSITIES = (1, 2, 3)
@@ -32,70 +33,31 @@ LEAST_SEGMENTS = 12
 LEAST_EACH = 3
 
 
-class OrdinalClassifier(ClassifierMixin, BaseEstimator):
-    """Ordered classes, by one classifier for each step between them (Frank and Hall 2001).
-
-    Each learns whether an item lies above its step. The probability of a class is the difference of two neighbours,
-    after their order has been restored where they cross. (mord, the package for this, has had no release since 2023.)
-
-    Parameters
-    ----------
-    estimator : classifier of scikit-learn
-        With `predict_proba`; it is cloned.
-
-    Attributes
-    ----------
-    classes_ : (C,) array
-        Ascending.
-    steps_ : list of C - 1 estimators
-    """
-
-    def __init__(self, estimator: Any) -> None:
-        self.estimator = estimator
-
-    def fit(self, X: np.ndarray, y: np.ndarray) -> OrdinalClassifier:
-        """Learn from (K, D) rows and (K,) values that can be ordered; there must be two or more."""
-        self.classes_ = np.unique(y)
-        if len(self.classes_) < 2:
-            raise ValueError("ordered classes need two or more")
-        self.n_features_in_ = np.shape(X)[1]
-        self.steps_ = [clone(self.estimator).fit(X, y > below) for below in self.classes_[:-1]]
-        return self
-
-    def predict_proba(self, X: np.ndarray) -> np.ndarray:
-        """(K, C) probability of each of `classes_`."""
-        above = np.column_stack([step.predict_proba(X)[:, 1] for step in self.steps_])
-        above = np.minimum.accumulate(above, axis=1)
-        whole = np.column_stack([np.ones(len(above)), above, np.zeros(len(above))])
-        return whole[:, :-1] - whole[:, 1:]
-
-    def predict(self, X: np.ndarray) -> np.ndarray:
-        """(K,) the most probable class of each row."""
-        return self.classes_[self.predict_proba(X).argmax(axis=1)]
-
-
-class IntensityClassifier(BaseEstimator):
+class IntensityClassifier:
     """The intensity of stable segments with a label.
 
     It sees how far a segment's mean descriptor lies from rest: the norm of its weights. On synthetic signers who were
     not trained on, the weights themselves do worse, and a line for each label does no better.
 
-    Parameters
-    ----------
-    classifier : OrdinalClassifier
-        It is cloned.
-
     Attributes
     ----------
     bases_ : tuple of str
+    levels_ : (C,) int array
+        The intensities that it gives, ascending.
+    lines_ : (C - 1, 2) array
+        Slope over the strength, and offset, of the log odds of lying above each level but the last. Plain numbers, so
+        that a saved model is read without scikit-learn.
     n_segments_ : int
     """
 
-    def __init__(self, classifier: Any) -> None:
-        self.classifier = classifier
-
     def fit(self, takes: Sequence[Descriptors], references: Sequence[Segments]) -> IntensityClassifier:
         """Learn from takes and annotations with `label` and `intensity`; segments without one are left out."""
+        from sklearn.linear_model import LogisticRegression
+        from sklearn.pipeline import make_pipeline
+        from sklearn.preprocessing import StandardScaler
+
+        from signface.label.ordinal import OrdinalClassifier
+
         self.bases_ = tuple(takes[0].names)
         rows, levels = [], []
         for take, reference in zip(takes, references, strict=True):
@@ -105,7 +67,10 @@ class IntensityClassifier(BaseEstimator):
             rows.append(strength[seen, None])
             levels.append(table["intensity"].to_numpy(int)[seen])
         self.n_segments_ = sum(map(len, levels))
-        self.classifier_ = clone(self.classifier).fit(np.concatenate(rows), np.concatenate(levels))
+        steps = OrdinalClassifier(make_pipeline(StandardScaler(), LogisticRegression(max_iter=500)))
+        steps.fit(np.concatenate(rows), np.concatenate(levels))
+        self.levels_ = steps.classes_
+        self.lines_ = np.array([_line(*step) for step in steps.steps_])
         return self
 
     def predict(self, take: Descriptors, spans: np.ndarray, labels: Sequence[str]) -> list[int | None]:
@@ -115,7 +80,8 @@ class IntensityClassifier(BaseEstimator):
         judged = np.isfinite(strength) & table["label"].isin(EXPRESSED).to_numpy()
         levels: list[int | None] = [None] * len(table)
         if judged.any():
-            found = self.classifier_.predict(strength[judged, None])
+            odds = strength[judged, None] * self.lines_[:, 0] + self.lines_[:, 1]
+            found = self.levels_[between_steps(1.0 / (1.0 + np.exp(-odds))).argmax(axis=1)]
             for row, level in zip(np.flatnonzero(judged), found, strict=True):
                 levels[row] = int(level)
         return levels
@@ -146,10 +112,6 @@ def train_intensity(examples: Sequence[Example]) -> IntensityClassifier | None:
     None where there is too little to learn from: fewer than `LEAST_SEGMENTS` segments with an intensity, or fewer than
     `LEAST_EACH` of a second intensity.
     """
-    from sklearn.linear_model import LogisticRegression
-    from sklearn.pipeline import make_pipeline
-    from sklearn.preprocessing import StandardScaler
-
     known = [e for e in examples if len(_with_intensity(e.reference))]
     if not known:
         return None
@@ -157,37 +119,7 @@ def train_intensity(examples: Sequence[Example]) -> IntensityClassifier | None:
     if counts.sum() < LEAST_SEGMENTS or len(counts) < 2 or counts.iloc[1] < LEAST_EACH:
         return None
     common_bases(known)
-    steps = OrdinalClassifier(make_pipeline(StandardScaler(), LogisticRegression(max_iter=500)))
-    return IntensityClassifier(steps).fit([e.descriptors for e in known], [e.reference for e in known])
-
-
-def ordinal_metrics(truth: Sequence[int], found: Sequence[int]) -> dict:
-    """How well ordered values agree.
-
-    Returns
-    -------
-    dict
-        `n`, and None where there is nothing: `exact` and `within_one`, shares of items; `mean_absolute_error`, steps;
-        `quadratic_kappa`, Cohen's kappa with quadratic weights (Cohen 1968), also None where it is undefined.
-
-    Examples
-    --------
-    >>> scores = ordinal_metrics([1, 2, 3, 3], [1, 2, 2, 1])
-    >>> scores["exact"], scores["within_one"], scores["mean_absolute_error"]
-    (0.5, 0.75, 0.75)
-    """
-    if not len(truth):
-        return {"n": 0, "exact": None, "within_one": None, "mean_absolute_error": None, "quadratic_kappa": None}
-    one, other = np.asarray(truth, int), np.asarray(found, int)
-    distance = np.abs(one - other)
-    chance = float(np.mean((one[:, None] - other[None, :]) ** 2))
-    return {
-        "n": len(one),
-        "exact": float(np.mean(distance == 0)),
-        "within_one": float(np.mean(distance <= 1)),
-        "mean_absolute_error": float(distance.mean()),
-        "quadratic_kappa": None if chance == 0 else float(1 - np.mean(distance**2) / chance),
-    }
+    return IntensityClassifier().fit([e.descriptors for e in known], [e.reference for e in known])
 
 
 def _with_intensity(reference: Segments) -> pd.DataFrame:
@@ -197,3 +129,19 @@ def _with_intensity(reference: Segments) -> pd.DataFrame:
         return pd.DataFrame(columns=["start_s", "end_s", "label", "intensity"])
     kept = (table["kind"] == "stable") & table["intensity"].notna() & table["label"].isin(EXPRESSED)
     return table.loc[kept, ["start_s", "end_s", "label", "intensity"]]
+
+
+def between_steps(above: np.ndarray) -> np.ndarray:
+    """(K, C) probabilities of ordered classes from the (K, C - 1) ones of lying above each but the last.
+
+    Where those of two neighbours cross, the lower one holds.
+    """
+    above = np.minimum.accumulate(above, axis=1)
+    whole = np.column_stack([np.ones(len(above)), above, np.zeros(len(above))])
+    return whole[:, :-1] - whole[:, 1:]
+
+
+def _line(scaler: StandardScaler, logistic: LogisticRegression) -> tuple[float, float]:
+    """Slope and offset of the log odds over what the scaler is given."""
+    slope = float(logistic.coef_[0, 0] / scaler.scale_[0])
+    return slope, float(logistic.intercept_[0] - slope * scaler.mean_[0])

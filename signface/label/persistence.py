@@ -38,7 +38,6 @@ TRUSTED = (
     "signface.label.crf.ChainLabeller",
     "signface.label.gru.RecurrentLabeller",
     "signface.label.intensity.IntensityClassifier",
-    "signface.label.intensity.OrdinalClassifier",
     "signface.label.sequence.SequenceLabeller",
     "sklearn.calibration.CalibratedClassifierCV",
     "sklearn.calibration._CalibratedClassifier",

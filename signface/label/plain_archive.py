@@ -23,7 +23,11 @@ SCHEMA = "schema.json"
 PROTOCOL = 2
 
 #: Models that consist of arrays and plain values.
-OURS = ("signface.label.crf.ChainLabeller", "signface.label.gru.RecurrentLabeller")
+OURS = (
+    "signface.label.crf.ChainLabeller",
+    "signface.label.gru.RecurrentLabeller",
+    "signface.label.intensity.IntensityClassifier",
+)
 
 CONTAINERS = {"ListNode": list, "TupleNode": tuple}
 KEYS = {"builtins.str": str, "builtins.int": int}
@@ -34,7 +38,7 @@ class _OtherError(Exception):
 
 
 def read_plain(archive: zipfile.ZipFile) -> Any:
-    """The object in a skops archive; None where it is not one of `OURS`, of arrays and plain values alone.
+    """The object in a skops archive; None where it holds more than `OURS`, arrays and plain values.
 
     Raises
     ------
@@ -42,20 +46,12 @@ def read_plain(archive: zipfile.ZipFile) -> Any:
         Of any kind, where the archive is damaged.
     """
     schema = json.loads(archive.read(SCHEMA))
-    name = _name(schema)
-    if schema.get("protocol") != PROTOCOL or schema.get("__loader__") != "ObjectNode" or name not in OURS:
+    if schema.get("protocol") != PROTOCOL:
         return None
     try:
-        state = _value(schema["content"], archive, {})
+        return _value(schema, archive, {})
     except _OtherError:
         return None
-    if not isinstance(state, dict):
-        return None
-    module, _, kind = name.rpartition(".")
-    own = getattr(importlib.import_module(module), kind)
-    model = own.__new__(own)
-    model.__dict__.update(state)
-    return model
 
 
 def _name(node: dict[str, Any]) -> str:
@@ -85,6 +81,12 @@ def _value(node: dict[str, Any], archive: zipfile.ZipFile, known: dict[int, Any]
             value = value[()]
             if f"{type(value).__module__}.{type(value).__name__}" != name:
                 raise _OtherError
+    elif loader == "ObjectNode" and name in OURS:
+        state = _value(node["content"], archive, known)
+        module, _, kind = name.rpartition(".")
+        own = getattr(importlib.import_module(module), kind)
+        value = own.__new__(own)
+        value.__dict__.update(state)
     else:
         raise _OtherError
     if number is not None:
