@@ -100,7 +100,8 @@ def test_the_lines_kept_say_what_the_classifiers_behind_them_say(takes):
     rows, levels = [], []
     for take in takes:
         table = take.stable[take.stable["label"] != "N"]
-        rows.append(
+        means = segment_means(take.descriptors, table[["start_s", "end_s"]].to_numpy(float))
+        rows.append(np.linalg.norm(means, axis=1))
             np.linalg.norm(segment_means(take.descriptors, table[["start_s", "end_s"]].to_numpy(float)), axis=1)
         )
         levels.append(table["intensity"].to_numpy(int))
