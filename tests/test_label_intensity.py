@@ -102,8 +102,6 @@ def test_the_lines_kept_say_what_the_classifiers_behind_them_say(takes):
         table = take.stable[take.stable["label"] != "N"]
         means = segment_means(take.descriptors, table[["start_s", "end_s"]].to_numpy(float))
         rows.append(np.linalg.norm(means, axis=1))
-            np.linalg.norm(segment_means(take.descriptors, table[["start_s", "end_s"]].to_numpy(float)), axis=1)
-        )
         levels.append(table["intensity"].to_numpy(int))
     X, y = np.concatenate(rows)[:, None], np.concatenate(levels)
     whole = OrdinalClassifier(make_pipeline(StandardScaler(), LogisticRegression(max_iter=500))).fit(X, y)
