@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import subprocess
 import sys
@@ -17,7 +18,7 @@ from sklearn.preprocessing import FunctionTransformer
 from signface.errors import SignfaceError
 from signface.files import shipped
 from signface.label.labellers import NAMES
-from signface.label.persistence import CARD, load_model, read_card, save_model
+from signface.label.persistence import CARD, _without_padding, load_model, read_card, save_model
 from signface.label.training import train_model
 from signface.label.vocabulary import AFFECTS
 from tests.hand_made import corpus, example
@@ -67,6 +68,21 @@ def test_two_trainings_with_one_seed_write_the_same_bytes(tmp_path):
     assert len(files) == 4
     for file in files:
         assert file.read_bytes() == (tmp_path / "other" / file.name).read_bytes(), file.name
+
+
+@settings(deadline=None, max_examples=10)
+@given(dirt=st.integers(1, 255), count=st.integers(0, 5))
+def test_what_memory_holds_between_fields_is_not_written(dirt, count):
+    kind = np.dtype({"names": ["a", "b"], "formats": ["<i8", "u1"], "itemsize": 16})
+    entries = []
+    for filling in (0, dirt):
+        nodes = np.full(16 * count, filling, dtype=np.uint8).view(kind)
+        nodes["a"], nodes["b"] = np.arange(count), 7
+        written = io.BytesIO()
+        np.save(written, nodes)
+        entries.append(_without_padding(written.getvalue()))
+    assert entries[0] == entries[1]
+    np.testing.assert_array_equal(np.load(io.BytesIO(entries[1]))["a"], np.arange(count))
 
 
 def test_the_card_is_plain_json_in_the_archive(saved):

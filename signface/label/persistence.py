@@ -4,8 +4,9 @@
 - `read_card`: what a file holds, without loading the estimator.
 
 A file is the zip archive that skops writes, with one more entry, `signface.json`, the card. Object identities in
-skops' own schema are memory addresses, and zip entries carry the time of day; both are replaced by counters and a
-fixed date, so that the same training writes the same bytes.
+skops' own schema are memory addresses, zip entries carry the time of day, and arrays of records what was in memory
+between their fields; they are replaced by counters, a fixed date and zeros, so that the same training writes the same
+bytes.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from dataclasses import asdict, fields
 from os import PathLike
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from signface.errors import SignfaceError
 from signface.files import shipped, whole_file
@@ -80,7 +83,7 @@ def save_model(model: TrainedModel, path: str | PathLike[str]) -> None:
     written = skops.io.dumps(model.estimator if model.intensity is None else both)
     with zipfile.ZipFile(io.BytesIO(written)) as archive:
         schema, names = _canonical(json.loads(archive.read(SCHEMA)))
-        contents = {new: archive.read(old) for old, new in names.items()}
+        contents = {new: _without_padding(archive.read(old)) for old, new in names.items()}
     contents[SCHEMA] = json.dumps(schema).encode()
     contents[CARD] = json.dumps(asdict(model.card), indent=1, ensure_ascii=False).encode()
     with whole_file(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
@@ -235,6 +238,24 @@ def _card(content: dict[str, Any]) -> Card:
     except SignfaceError as error:
         raise ValueError(error.problem) from error
     return card
+
+
+def _without_padding(data: bytes) -> bytes:
+    """The content of an entry, with zeros between the fields of an array of records.
+
+    The nodes of scikit-learn's trees have seven bytes of padding each, which hold whatever was in memory.
+    """
+    if not data.startswith(np.lib.format.MAGIC_PREFIX):
+        return data
+    array = np.load(io.BytesIO(data), allow_pickle=False)
+    if array.dtype.names is None:
+        return data
+    clean = np.zeros(array.shape, array.dtype)  # zeros_like would leave the padding as it finds it
+    for name in array.dtype.names:
+        clean[name] = array[name]
+    written = io.BytesIO()
+    np.save(written, clean, allow_pickle=False)
+    return written.getvalue()
 
 
 def _canonical(schema: Any) -> tuple[Any, dict[str, str]]:
