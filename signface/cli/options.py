@@ -96,16 +96,22 @@ def writing_options(arguments: argparse.Namespace) -> dict[str, Any]:
     SignfaceError
         A file is missing or broken, or the confidence is none.
     """
-    from signface.elan.mapping import read_mapping
-    from signface.label.channels import read_channels
-
     if arguments.doubtful is not None and not 0 <= arguments.doubtful <= 1:
         raise SignfaceError(f"--doubtful is a confidence from 0 to 1, not {arguments.doubtful:g}")
+    channels = mapping = None
+    if arguments.channels is not None:  # pandas comes with it, which is otherwise imported beside the solve
+        from signface.label.channels import read_channels
+
+        channels = read_channels(arguments.channels)
+    if arguments.mapping is not None:
+        from signface.elan.mapping import read_mapping
+
+        mapping = read_mapping(arguments.mapping)
     return {
-        "channels": None if arguments.channels is None else read_channels(arguments.channels),
+        "channels": channels,
         "doubtful_below": arguments.doubtful,
         "template": arguments.template,
-        "mapping": None if arguments.mapping is None else read_mapping(arguments.mapping),
+        "mapping": mapping,
     }
 
 
