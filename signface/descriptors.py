@@ -41,12 +41,12 @@ class Descriptors:
     head : (F, 4, 4) float64 array, optional
         Pose of the head relative to its neutral frame: maps a point of the neutral head to its place in the
         recording, millimetres. The identity when unknown.
-    deviation : (F, N) float64 array, optional
-        Standard deviation of each weight; NaN where the markers say nothing. None when it was not asked for.
     name : str
         Name of the take.
     history : tuple of str
         What was done, oldest first.
+    deviation : (F, N) float64 array, optional
+        Standard deviation of each weight; NaN where the markers say nothing. None when it was not asked for.
     """
 
     weights: np.ndarray
@@ -55,9 +55,9 @@ class Descriptors:
     start: float = 0.0
     residual: np.ndarray | None = None
     head: np.ndarray | None = None
-    deviation: np.ndarray | None = None
     name: str = "take"
     history: tuple[str, ...] = field(default=())
+    deviation: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         weights = np.array(self.weights, dtype=np.float64)

@@ -121,7 +121,8 @@ def test_with_two_groups_dunn_is_kruskal_wallis(groups):
         assert math.isnan(pair.p)
         return
     assert pair.statistic**2 == pytest.approx(whole.statistic, abs=1e-9)
-    assert pair.p == pytest.approx(whole.p, abs=1e-9)
+    # Near a statistic of 0 its rounding, 1e-14, is one of 1e-7 in the root of it, and in p.
+    assert pair.p == pytest.approx(whole.p, abs=1e-6)
 
 
 @quick
