@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from signface.cli.options import add_face_arguments, neutral_time, read_face_and_layout
+from signface.cli.options import add_face_arguments, add_neutral_argument, read_face_and_layout
 from signface.errors import SignfaceError
 
 EXAMPLE = """  signface calibrate range-of-motion.c3d shown.csv -o signer.csv
@@ -28,13 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "-o", "--output", type=Path, required=True, metavar="FILE", help="the signer's bases, for --signer-bases (.csv)"
     )
     add_face_arguments(parser)
-    parser.add_argument(
-        "--neutral",
-        default="auto",
-        type=neutral_time,
-        metavar="SECONDS",
-        help="time of a frame with a neutral face, or auto (default: %(default)s)",
-    )
+    add_neutral_argument(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -28,9 +28,8 @@ def add_face_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_solve_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add `--face`, `--layout`, `--neutral`, and how markers become weights; see `solve_options`."""
-    add_face_arguments(parser)
+def add_neutral_argument(parser: argparse.ArgumentParser) -> None:
+    """Add `--neutral`."""
     parser.add_argument(
         "--neutral",
         default="auto",
@@ -38,6 +37,12 @@ def add_solve_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SECONDS",
         help="time of a frame with a neutral face, or auto (default: %(default)s)",
     )
+
+
+def add_solve_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add `--face`, `--layout`, `--neutral`, and how markers become weights; see `solve_options`."""
+    add_face_arguments(parser)
+    add_neutral_argument(parser)
     parser.add_argument("--method", default="thin-shell", help="how weights are solved (default: %(default)s)")
     parser.add_argument(
         "--alpha", type=float, metavar="A", help="weight of the thin shell, 0 to 1 (default: the method's own)"

@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
 import numpy as np
@@ -31,7 +32,7 @@ LEAST = 1e-3
 FURTHEST = 6.0
 
 
-class TakeLabeller(BaseEstimator):
+class TakeLabeller(BaseEstimator, ABC):
     """Base class of the models that find borders and labels of a take at once, learnt from annotated takes.
 
     A model gives `fit` (which calls `states_of`), `frame_probabilities` and `find`; from these come the annotation
@@ -79,17 +80,17 @@ class TakeLabeller(BaseEstimator):
             )
         return states
 
+    @abstractmethod
     def frame_probabilities(self, take: Descriptors) -> np.ndarray:
         """(K, A + 1) probability of each of `classes_`, and of a transition, at the times of `frame_times`."""
-        raise NotImplementedError
 
+    @abstractmethod
     def find(self, take: Descriptors) -> tuple[np.ndarray, list[tuple[int, int, int]]]:
         """What `label_probabilities` gives, and the course of the take.
 
         The course holds the first frame, the frame after the last, and the code of the label (-1 for a transition) of
         each segment in turn; the first and the last are stable.
         """
-        raise NotImplementedError
 
     def label_probabilities(self, take: Descriptors) -> np.ndarray:
         """(K, A) probability of each of `classes_` at each frame, if it is no transition."""

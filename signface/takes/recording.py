@@ -13,32 +13,20 @@ from typing import Protocol
 
 import numpy as np
 
-from signface.takes.take import Take, frame_at
+from signface.takes.take import Take, Timed, frame_at
 
 #: Frames worked on at a time: 46 markers then take 18 MB, and the two minutes of an ordinary take are two pieces.
 PIECE = 16384
 
 
-class Recording(Protocol):
+class Recording(Timed, Protocol):
     """Trajectories of markers, in memory or on disk; attributes as of `Take`."""
 
     @property
     def labels(self) -> tuple[str, ...]: ...
 
     @property
-    def rate(self) -> float: ...
-
-    @property
-    def start(self) -> float: ...
-
-    @property
-    def name(self) -> str: ...
-
-    @property
     def history(self) -> tuple[str, ...]: ...
-
-    @property
-    def n_frames(self) -> int: ...
 
     def frames(self, begin: int, end: int, step: int = 1) -> np.ndarray:
         """(K, M, 3) positions of every `step`-th frame from `begin` to before `end`, millimetres, NaN where missing."""

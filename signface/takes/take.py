@@ -113,7 +113,9 @@ class Take:
         return replace(self, history=(*self.history, operation), **fields)  # type: ignore[arg-type]
 
 
-class _Timed(Protocol):
+class Timed(Protocol):
+    """What has frames at times."""
+
     @property
     def rate(self) -> float: ...
 
@@ -127,7 +129,7 @@ class _Timed(Protocol):
     def n_frames(self) -> int: ...
 
 
-def frame_at(recording: _Timed, seconds: float) -> int:
+def frame_at(recording: Timed, seconds: float) -> int:
     """Index of the frame of a recording that is nearest to a time; see `Take.frame_at`."""
     frame = round((seconds - recording.start) * recording.rate) if np.isfinite(seconds) else -1
     if not 0 <= frame < recording.n_frames:
