@@ -187,7 +187,7 @@ def modified_kappa(first: pd.DataFrame, second: pd.DataFrame, *, overlap: float 
     return ModifiedKappa(_kappa(counts, chance), kappa_max, float(np.trace(counts) / total), table)
 
 
-def _fitted(rows: np.ndarray, columns: np.ndarray, *, rounds: int = 200) -> np.ndarray:
+def _fitted(rows: np.ndarray, columns: np.ndarray, *, rounds: int = 2000) -> np.ndarray:
     """The table with these margins whose last cell is zero and whose others are as independent as that allows."""
     fitted = np.ones((len(rows), len(columns)))
     fitted[-1, -1] = 0
