@@ -16,7 +16,7 @@ import numpy as np
 from sklearn.ensemble import RandomForestClassifier
 from sklearn.metrics import confusion_matrix
 
-from signface.corpus.synthesis import make_take, plan_corpus
+from signface.synth.corpus import make_take, plan_corpus
 
 LABELS = ("N", "A", "D", "F", "J", "Sa", "Su")
 #: Every fourth frame: 50 Hz is plenty for means and for training.

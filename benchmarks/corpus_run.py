@@ -28,7 +28,7 @@ import numpy as np
 
 from signface.corpus.manifest import TakeEntry, read_corpus, write_takes
 from signface.files import bundled_corpus
-from signface.takes.c3d import write_c3d
+from signface.takes.formats.c3d import write_c3d
 from signface.takes.reading import read_take
 
 SECONDS = 10.0

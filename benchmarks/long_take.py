@@ -21,8 +21,8 @@ import numpy as np
 
 from signface.corpus.manifest import read_corpus
 from signface.files import bundled_corpus
-from signface.takes.c3d import write_c3d
-from signface.takes.c3d_structure import MOST_FRAMES, read_structure
+from signface.takes.formats.c3d import write_c3d
+from signface.takes.formats.c3d_structure import MOST_FRAMES, read_structure
 from signface.takes.reading import read_take
 from signface.takes.take import Take
 

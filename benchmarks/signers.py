@@ -15,14 +15,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from signface.corpus.synthesis import Job, make_plan, make_signer, make_take
-from signface.corpus.synthetic_expressions import Spread
-from signface.corpus.synthetic_markers import head_motion, record
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.solve.creep import RATE_HZ, Creep
 from signface.solve.range_of_motion import Shown
 from signface.solve.solving import prepare_take
+from signface.synth.corpus import Job, make_plan, make_signer, make_take
+from signface.synth.expressions import Spread
+from signface.synth.markers import head_motion, record
 from signface.takes.take import Take
 
 RATE = 200.0

@@ -25,9 +25,9 @@ from signface.face.reading import read_face
 from signface.files import whole_file
 from signface.solve.bounds import LOWER, UPPER
 from signface.solve.calibration import calibrate
-from signface.solve.direct import ThinShellDeformation
 from signface.solve.methods import METHODS, make_solver
 from signface.solve.range_of_motion import calibrate_shown
+from signface.solve.rivals.direct import ThinShellDeformation
 from signface.solve.solver import Solution
 from signface.solve.thin_shell import ThinShellSolver
 from signface.solve.uncertainty import deviations

@@ -14,11 +14,11 @@ import warnings
 
 import numpy as np
 
-from signface.study.model_tables import compare_methods
-from signface.study.rank_tests import wilcoxon
 from signface.study.responses import validate
-from signface.study.simulation import Effects, crossed_design, simulate
-from signface.study.thesis_tables import pairwise_results, participant_means, test_methods
+from signface.study.statistics.model_tables import compare_methods
+from signface.study.statistics.rank_tests import wilcoxon
+from signface.study.statistics.simulation import Effects, crossed_design, simulate
+from signface.study.statistics.thesis_tables import pairwise_results, participant_means, test_methods
 
 QUESTIONS = ("correct", "answer_difficulty")
 

@@ -93,9 +93,9 @@ async def run_load(address: str, participants: int, *, arrive_s: float, look_s: 
 def check_nothing_is_lost(load: Load, database: str | Path) -> tuple[int, int]:
     """(lost, extra): acknowledged answers that the database does not hold so, and those that it holds besides."""
     from signface.study.design import read_study
-    from signface.study.questionnaire import pages_of
-    from signface.study.store import open_store
-    from tests.study_site import write_study
+    from signface.study.questionnaire.questionnaire import pages_of
+    from signface.study.questionnaire.store import open_store
+    from tests.fixtures.study_site import write_study
 
     with tempfile.TemporaryDirectory() as folder:
         study = read_study(write_study(Path(folder)).folder)
@@ -117,8 +117,8 @@ def check_nothing_is_lost(load: Load, database: str | Path) -> tuple[int, int]:
 
 def main() -> None:
     """Measure and print."""
-    from tests.study_servers import served
-    from tests.study_site import small_film, write_study
+    from tests.fixtures.study_servers import served
+    from tests.fixtures.study_site import small_film, write_study
 
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--participants", type=int, default=200)

@@ -26,8 +26,8 @@ from signface.files import whole_file
 from signface.label.labellers import NAMES, SEQUENCE_NAMES
 from signface.label.model import Card
 from signface.label.persistence import save_model
-from signface.label.training import Example, train_model
 from signface.label.vocabulary import AFFECTS
+from signface.learn.training import Example, train_model
 
 FOLDER = Path(__file__).resolve().parent / "classifiers"
 #: name: classifier and kinds of takes that it is trained on.
@@ -99,7 +99,7 @@ def card_text(name: str, card: Card, sections: dict) -> str:
         for i, (label, row) in enumerate(zip(truth["labels"], truth["confusion"], strict=True))
         if sum(row)
     )
-    borders = ", ".join(
+    boundaries = ", ".join(
         f"{value:.2f} within {tolerance} s" for tolerance, value in sections["segmentation"]["boundary_f1"].items()
     )
     return f"""# The classifier `{name}`
@@ -130,8 +130,8 @@ How many reference segments of each expression get their label:
 | --- | --- | --- |
 {recalls}
 
-Its borders against the reference's (for `thesis-forest`, those of `signface segment`): F1 {borders}.
-The references carry the uncertainty of an annotator, 30 to 80 ms: the exact borders reach 0.93 within 0.10 s.
+Its boundaries against the reference's (for `thesis-forest`, those of `signface segment`): F1 {boundaries}.
+The references carry the uncertainty of an annotator, 30 to 80 ms: the exact boundaries reach 0.93 within 0.10 s.
 
 Segments of one take are alike: the interval comes from drawing whole takes again.
 

@@ -25,7 +25,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from signface.face.gltf import write_face
+from signface.face.files.gltf import write_face
 from signface.face.mesh import Mesh
 from signface.face.model import FaceModel
 from signface.face.subdivision import subdivide

@@ -6,6 +6,7 @@ It stands at the top of the package because the rooms on both sides of it (solve
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
@@ -114,9 +115,25 @@ class Descriptors:
         SignfaceError
             There is no base of that name.
         """
+        return self.weights[:, self._column(name)]
+
+    def on(self, bases: Sequence[str]) -> Descriptors:
+        """The take with these bases only, in this order; standard deviations are left behind.
+
+        Raises
+        ------
+        SignfaceError
+            There is no base of a name.
+        """
+        if self.names == tuple(bases):
+            return self
+        columns = [self._column(name) for name in bases]
+        return replace(self, weights=self.weights[:, columns], names=tuple(bases), deviation=None)
+
+    def _column(self, name: str) -> int:
         if name not in self.names:
             raise SignfaceError(f"{self.name}: no base named {name}", hint=f"the bases are {', '.join(self.names)}")
-        return self.weights[:, self.names.index(name)]
+        return self.names.index(name)
 
     def changed(self, operation: str, **fields: object) -> Descriptors:
         """A copy with some fields replaced and `operation` appended to its history."""

@@ -132,12 +132,12 @@ def check_files(arguments: argparse.Namespace) -> int:
 
 def write_mapping(arguments: argparse.Namespace) -> None:
     """Write a first mapping file."""
+    from signface.channels.rules import closed_vocabularies, read_channels
     from signface.elan.channels import vocabulary_of
     from signface.elan.document import read_document
     from signface.elan.mapping import suggest_mapping
     from signface.elan.vocabularies import AFFECT, INTENSITY, Vocabulary
     from signface.files import whole_file
-    from signface.label.channels import closed_vocabularies, read_channels
 
     if arguments.output.suffix.lower() != ".toml":
         raise SignfaceError("the ending of a mapping file is .toml", file=arguments.output)
@@ -187,8 +187,8 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
         raise SignfaceError("the ending of a classifier is .skops", file=arguments.output)
 
     from signface.label.persistence import load_model, save_model
-    from signface.label.relearning import held_out_labels
-    from signface.label.training import train_model
+    from signface.learn.relearning import held_out_labels
+    from signface.learn.training import train_model
 
     def solved(folder: Path) -> list:
         own = read_corpus(folder)
@@ -245,7 +245,7 @@ def compare_annotators(arguments: argparse.Namespace) -> None:
     import pandas as pd
 
     from signface.elan.reference import read_tiers
-    from signface.evaluate.agreement import agreement_table, confusion, frame_labels, modified_kappa
+    from signface.metrics.agreement import agreement_table, confusion, frame_labels, modified_kappa
 
     files = arguments.files
     if len(files) < 2:

@@ -15,7 +15,7 @@ from signface.errors import SignfaceError
 from signface.label.labellers import NAMES, SEQUENCE_NAMES
 
 if TYPE_CHECKING:
-    from signface.label.examples import Example
+    from signface.learn.examples import Example
     from signface.segment.segments import Segments
 
 EXAMPLE = """  signface evaluate corpora/feel -o reports/feel
@@ -85,7 +85,8 @@ def run(arguments: argparse.Namespace) -> None:
     from signface.corpus.facts import corpus_facts
     from signface.corpus.manifest import read_corpus
     from signface.face.reading import read_face
-    from signface.report.evaluation_report import Evaluated, write_report
+    from signface.report.evaluation.evaluated import Evaluated
+    from signface.report.evaluation.report import write_report
 
     unknown = [name for name in arguments.classifiers if name not in NAMES | SEQUENCE_NAMES]
     if unknown or not arguments.classifiers:
@@ -193,7 +194,7 @@ def measure(
 
 def print_results(metrics: dict) -> None:
     """Print accuracies beside chance and the majority class, and how the segments agree."""
-    from signface.report.evaluation_tables import PROTOCOL_TITLES, SECTIONS, by_protocol
+    from signface.report.evaluation.tables import PROTOCOL_TITLES, SECTIONS, by_protocol
     from signface.report.page_tables import spelt as number
 
     for protocol, part in by_protocol(metrics).items():

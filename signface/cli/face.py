@@ -108,7 +108,7 @@ def _check(arguments: argparse.Namespace) -> int:
 
 def _convert(arguments: argparse.Namespace) -> int:
     from signface.face.checking import clean_face
-    from signface.face.gltf import write_face
+    from signface.face.files.gltf import write_face
     from signface.face.reading import read_face
 
     face = read_face(arguments.face, neutral=arguments.neutral_shape)

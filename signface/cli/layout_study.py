@@ -12,9 +12,9 @@ from signface.errors import SignfaceError
 
 if TYPE_CHECKING:
     from signface.face.model import FaceModel
-    from signface.placement.actors import Actor
     from signface.placement.layout_study import Cell, Entry, Plan
     from signface.placement.sites import Rules
+    from signface.synth.actors import Actor
 
 EXAMPLE = (
     "  signface layout place signcom-41 -o signcom.csv\n"
@@ -132,9 +132,9 @@ def _warn(face: FaceModel, actors: list[Actor]) -> list[str]:
 def _optimise(arguments: argparse.Namespace) -> None:
     from signface.face.layout_files import write_layout
     from signface.face.reading import read_face
-    from signface.placement.actors import draw_actors
     from signface.placement.choosing import METHODS, Material, choose
     from signface.render.layout_sheet import draw_sheet
+    from signface.synth.actors import draw_actors
 
     face = read_face("default")
     rules = _rules(arguments, face)
@@ -154,10 +154,10 @@ def _study(arguments: argparse.Namespace) -> None:
     from signface.face.reading import read_face
     from signface.files import whole_file
     from signface.placement import layout_study
-    from signface.placement.actors import draw_actors
     from signface.placement.choosing import METHODS, Material, choose
     from signface.render.layout_sheet import distances, draw_sheet
-    from signface.report.layout_study_page import study_page
+    from signface.report.layouts.page import study_page
+    from signface.synth.actors import draw_actors
 
     face, folder = read_face("default"), Path(arguments.output)
     rules = _rules(arguments, face)

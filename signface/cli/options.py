@@ -105,7 +105,7 @@ def writing_options(arguments: argparse.Namespace) -> dict[str, Any]:
         raise SignfaceError(f"--doubtful is a confidence from 0 to 1, not {arguments.doubtful:g}")
     channels = mapping = None
     if arguments.channels is not None:  # pandas comes with it, which is otherwise imported beside the solve
-        from signface.label.channels import read_channels
+        from signface.channels.rules import read_channels
 
         channels = read_channels(arguments.channels)
     if arguments.mapping is not None:

@@ -93,7 +93,7 @@ def run_new(arguments: argparse.Namespace) -> None:
 def run_serve(arguments: argparse.Namespace) -> None:
     """Serve until interrupted."""
     from signface.study.design import read_study
-    from signface.study.server import organiser_token, serve
+    from signface.study.questionnaire.server import organiser_token, serve
 
     study = read_study(arguments.study)
     store = _store(arguments, study.folder)
@@ -109,7 +109,7 @@ def run_serve(arguments: argparse.Namespace) -> None:
 def run_export(arguments: argparse.Namespace) -> None:
     """Write the csv."""
     from signface.study.design import read_study
-    from signface.study.export import write_export
+    from signface.study.questionnaire.export import write_export
 
     study = read_study(arguments.study, films=False)
     store = _store(arguments, study.folder, existing=True)
@@ -131,7 +131,7 @@ def run_erase(arguments: argparse.Namespace) -> None:
 
 
 def _store(arguments: argparse.Namespace, folder: Path, *, existing: bool = False):
-    from signface.study.store import open_store
+    from signface.study.questionnaire.store import open_store
 
     file = folder / "answers.sqlite"
     if arguments.database is None and existing and not file.is_file():

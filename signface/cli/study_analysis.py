@@ -33,10 +33,10 @@ def add_analyse_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run_analyse(arguments: argparse.Namespace) -> int:
     """Print the tables; write the report and the tables as CSV and LaTeX."""
-    from signface.report.study_report import write_report
-    from signface.study.analysis import analyse
+    from signface.report.study.report import write_report
     from signface.study.responses import combine, read_responses
-    from signface.study.tables import as_text
+    from signface.study.statistics.analysis import analyse
+    from signface.study.statistics.tables import as_text
 
     if not 0 < arguments.alpha < 1:
         raise SignfaceError(f"--alpha {arguments.alpha:g} is no significance level", hint="choose one between 0 and 1")
@@ -87,7 +87,7 @@ def add_simulate_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run_simulate(arguments: argparse.Namespace) -> int:
     """Write the answers of participants who do not exist."""
-    from signface.study.simulation import Effects, simulate, study_design
+    from signface.study.statistics.simulation import Effects, simulate, study_design
 
     design = study_design(arguments.study)
     if min(arguments.spread, arguments.reactions) < 0:

@@ -86,7 +86,7 @@ def run_render(arguments: argparse.Namespace) -> None:
 def _render_study(folder: Path) -> None:
     from signface.cli.progress import progress
     from signface.study.design import read_study
-    from signface.study.stimuli import make_synthetic_takes, plan_films, render_study
+    from signface.study.films.stimuli import make_synthetic_takes, plan_films, render_study
 
     study = read_study(folder, films=False)
 
@@ -103,7 +103,7 @@ def _render_file(source: Path, arguments: argparse.Namespace) -> None:
     from signface.face.layout_files import choose_layout
     from signface.render.film import Avatar
     from signface.render.raster import Style
-    from signface.study.stimuli import parse_method, solve_methods
+    from signface.study.films.stimuli import parse_method, solve_methods
     from signface.takes.reading import read_recording
     from signface.takes.take import Take
 

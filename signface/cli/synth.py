@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Make the corpus and say what was made."""
     from signface.cli.progress import progress
-    from signface.corpus.synthesis import synthesise
+    from signface.synth.corpus import synthesise
 
     settings = {key: getattr(arguments, key) for key in ("signers", "seed") if getattr(arguments, key) is not None}
     if arguments.kinds is not None:

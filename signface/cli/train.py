@@ -49,7 +49,7 @@ def add_training_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def training_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """What `signface.label.training.train_model` is told of `add_training_arguments`; names are checked."""
+    """What `signface.learn.training.train_model` is told of `add_training_arguments`; names are checked."""
     from signface.label.variants import DescriptorVariant
 
     DescriptorVariant(arguments.features, arguments.normalise).check()
@@ -85,7 +85,7 @@ def run(arguments: argparse.Namespace) -> None:
     from signface.corpus.examples import solve_examples
     from signface.corpus.manifest import read_corpus
     from signface.label.persistence import save_model
-    from signface.label.training import train_model
+    from signface.learn.training import train_model
 
     output = arguments.output
     if output.suffix.lower() != ".skops":

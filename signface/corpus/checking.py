@@ -26,7 +26,7 @@ from signface.errors import SignfaceError
 if TYPE_CHECKING:
     from signface.takes.take import Take
 
-#: An annotation may reach this far beyond its take (s): annotators place borders by the video, a few frames off.
+#: An annotation may reach this far beyond its take (s): annotators place boundaries by the video, a few frames off.
 BEYOND_S = 0.2
 
 #: An annotation that covers less than this part of its take is that of another one, or is not finished.

@@ -12,7 +12,7 @@ from signface.corpus.manifest import Corpus, TakeEntry
 from signface.corpus.origin import Origin, Recipe, find_origin, make_recipe
 from signface.corpus.store import DescriptorStore, open_store
 from signface.errors import SignfaceError
-from signface.label.examples import Example
+from signface.learn.examples import Example
 
 #: Takes solved at the same time.
 WORKERS = 2

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from signface.channels.rules import ChannelEvents
 from signface.elan.tiers import DependentTier, Tier, milliseconds
 from signface.elan.vocabularies import Entry, Vocabulary
-from signface.label.channels import ChannelEvents
 
 #: Okabe and Ito's colours, in turn for the values of a channel.
 COLOURS = (
@@ -30,7 +30,7 @@ def channel_tiers(channels: Sequence[ChannelEvents], signer: str = "") -> list[T
     Parameters
     ----------
     channels : sequence of ChannelEvents
-        What `signface.label.channels.find_channels` returns.
+        What `signface.channels.rules.find_channels` returns.
     signer : str
     """
     tiers = []

@@ -82,7 +82,7 @@ def write_eaf(
     vocabulary : Vocabulary
         The labels allowed on the affect tier.
     tiers : sequence of Tier
-        Further tiers (`tiers.doubtful_tier`, `signface.label.channels`).
+        Further tiers (`tiers.doubtful_tier`, `signface.channels.rules`).
     linked_files : sequence of path
         Curves and their description, linked as secondary files (`.csv` as text/plain, `.xml` as text/xml).
     template : path, optional

@@ -12,6 +12,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from signface.channels.rules import find_channels, find_intensities
 from signface.descriptors import Descriptors
 from signface.elan.channels import channel_tiers
 from signface.elan.curves import write_curves, write_tsconf
@@ -20,7 +21,6 @@ from signface.elan.export import prepare_eaf, prepare_into
 from signface.elan.mapping import Mapping
 from signface.elan.tiers import doubtful_tier
 from signface.elan.vocabularies import AFFECT
-from signface.label.channels import find_channels, find_intensities
 from signface.segment.segments import Segments
 
 TSCONF = "_tsconf.xml"
@@ -54,7 +54,7 @@ def write_take(
     signer, video, properties, mapping, date, replace :
         As in `export.write_eaf`.
     channels : mapping, optional
-        Thresholds (`signface.label.channels.read_channels`): also write the further channels, and the intensity of the
+        Thresholds (`signface.channels.rules.read_channels`): also write the further channels, and the intensity of the
         affect by their rule where the segments have none.
     doubtful_below : float, optional
         Also write the segments whose confidence is below this on a tier of their own.

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from signface.evaluate.agreement import match_annotations
+from signface.metrics.agreement import match_annotations
 
 #: Share of the longer of two annotations that must overlap for one to be a correction of the other.
 SAME = 0.3

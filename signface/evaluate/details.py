@@ -16,11 +16,11 @@ import pandas as pd
 from signface.evaluate.importance import can_be_judged, permutation_importance
 from signface.evaluate.learning_curve import learning_curve, remembering
 from signface.evaluate.protocol import Evaluation, Fold
-from signface.evaluate.segmentation import segmentation_metrics
-from signface.label.examples import Example
 from signface.label.labellers import NAMES
 from signface.label.model import TrainedModel
-from signface.label.training import train_model
+from signface.learn.examples import Example
+from signface.learn.training import train_model
+from signface.metrics.segmentation import segmentation_metrics
 from signface.segment.segments import Segments
 
 #: How the segmentation that learns nothing is called among the methods (thesis, 4.4.2).

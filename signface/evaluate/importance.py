@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from signface.evaluate.classification import accuracy_interval
-from signface.label.labelling import segment_means
 from signface.label.model import TrainedModel
+from signface.label.spans import segment_means
 from signface.label.variants import signer_level
 from signface.label.vocabulary import AFFECTS
+from signface.metrics.classification import accuracy_interval
 
 if TYPE_CHECKING:
     from signface.evaluate.protocol import Fold

@@ -17,11 +17,12 @@ from sklearn.utils.parallel import Parallel, delayed
 
 from signface.errors import SignfaceError
 from signface.evaluate.importance import can_be_judged
-from signface.label.examples import Example
-from signface.label.labelling import label_spans, segment_means
+from signface.label.labelling import label_spans
 from signface.label.model import TrainedModel
-from signface.label.training import train_model
+from signface.label.spans import segment_means
 from signface.label.variants import signer_level
+from signface.learn.examples import Example
+from signface.learn.training import train_model
 from signface.segment.segments import Segments
 
 if TYPE_CHECKING:

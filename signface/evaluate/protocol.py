@@ -17,21 +17,21 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from signface.channels.rules import find_intensities
 from signface.errors import SignfaceError
-from signface.evaluate.classification import accuracy_interval, classification_metrics, mcnemar
-from signface.evaluate.segmentation import segmentation_metrics
 from signface.label.calibration import brier_score, expected_calibration_error
-from signface.label.channels import find_intensities
-from signface.label.examples import Example, signer_levels
-from signface.label.folds import groups_of, inner_folds
 from signface.label.intensity import IntensityClassifier
 from signface.label.labellers import NAMES
 from signface.label.labelling import find_segments, label_segments, label_spans
 from signface.label.model import TrainedModel
-from signface.label.ordinal import ordinal_metrics
-from signface.label.training import train_model
 from signface.label.variants import SignerLevel
 from signface.label.vocabulary import AFFECTS
+from signface.learn.examples import Example, signer_levels
+from signface.learn.folds import groups_of, inner_folds
+from signface.learn.ordinal import ordinal_metrics
+from signface.learn.training import train_model
+from signface.metrics.classification import accuracy_interval, classification_metrics, mcnemar
+from signface.metrics.segmentation import segmentation_metrics
 from signface.segment.segmentation import segment
 from signface.segment.segments import Segments, value_at
 
@@ -183,7 +183,7 @@ def evaluate(
     - *Frames*: the whole annotation, transitions included, is compared with the reference 25 times a second, with
       all transitions as one further label. This is what an annotator finds on opening the file.
     - *Intensity*: that of each stable segment of the reference which has one, given its label, by what was learnt from
-      the training takes and by the rule of `signface.label.channels`.
+      the training takes and by the rule of `signface.channels.rules`.
 
     What chooses parameters or calibrates does so within the training takes of each fold. Where a signer is normalised,
     it is by the test takes of the fold, of which no label is looked at.
@@ -198,7 +198,7 @@ def evaluate(
     segments : dict of Segments, optional
         Automatic segments of test takes by name, where they are known already.
     training : mapping, optional
-        What else `signface.label.training.train_model` is told: `features`, `normalise`, `search`, `calibrate` and so
+        What else `signface.learn.training.train_model` is told: `features`, `normalise`, `search`, `calibrate` and so
         on. Sequence models, which make their own features, are not told of `features`.
     progress : callable, optional
         Wraps the list of steps, to show how far it is.

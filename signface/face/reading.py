@@ -16,11 +16,11 @@ from pathlib import Path
 import numpy as np
 
 from signface.errors import SignfaceError
-from signface.face.gltf import RawFace, read_gltf
+from signface.face.files.gltf import RawFace, read_gltf
+from signface.face.files.obj import read_obj_folder
+from signface.face.files.wfm import read_wfm
 from signface.face.mesh import Mesh
 from signface.face.model import FaceModel
-from signface.face.obj import read_obj_folder
-from signface.face.wfm import read_wfm
 from signface.files import models_folder, shipped
 
 #: Millimetres in each unit a face may come in.

@@ -1,6 +1,6 @@
 """The classifiers of the thesis (4.4.3) as scikit-learn estimators, and the names of all there are.
 
-- `NAMES`: those of the thesis; `SEQUENCE_NAMES`: the models that know time (`signface.label.sequence`).
+- `NAMES`: those of the thesis; `SEQUENCE_NAMES`: the models that know time (`signface.sequence.hsmm`).
 - `make_labeller`: a new, untrained one.
 """
 
@@ -23,7 +23,7 @@ NAMES = {
     "forest": "random forest",
 }
 
-#: Sequence models, which find borders and labels at once. name: what it is.
+#: Sequence models, which find boundaries and labels at once. name: what it is.
 SEQUENCE_NAMES = {
     "net-hsmm": "neural network on frames, decoded by a hidden semi-Markov model",
     "forest-viterbi": "random forest on frames, decoded by Viterbi's algorithm through a transition state",
@@ -56,7 +56,7 @@ def make_labeller(
         Seed of the forest; the others draw nothing.
     balanced : bool
         Let every label weigh the same, however often it occurs. Nearest neighbours have no weights:
-        `signface.label.training` gives them equally many frames of each.
+        `signface.learn.training` gives them equally many frames of each.
     parameters : mapping, optional
         Parameters of the classifier (of the machine itself, for those with calibrated probabilities) to set.
 

@@ -1,6 +1,5 @@
 """Labels for the segments of a take (thesis 4.4.3).
 
-- `segment_means`: the mean descriptor of each segment (eq. 4.6).
 - `label_spans`: a label and a confidence for any stretches of a take, each for itself.
 - `label_segments`: the segments of a take with labels, transitions included.
 - `find_segments`: a take's segments and their labels by whatever the model is, from nothing but the take.
@@ -17,6 +16,7 @@ import pandas as pd
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.label.model import TrainedModel
+from signface.label.spans import frames_within, segment_means
 from signface.label.variants import SignerLevel
 from signface.label.vocabulary import join
 from signface.segment.segmentation import segment
@@ -30,24 +30,6 @@ LEAST = 1e-3
 
 #: How much of a transition at the end of the take stands for the expression outside it (s).
 EDGE_S = 0.05
-
-
-def segment_means(descriptors: Descriptors, spans: np.ndarray) -> np.ndarray:
-    """(S, N) mean weights of the frames of each span (eq. 4.6); NaN for a span without any.
-
-    Parameters
-    ----------
-    descriptors : Descriptors
-    spans : (S, 2) array
-        Start and end of each span in seconds; the frames with `start <= time < end` belong to it, and a span that
-        falls between two frames takes the nearest one.
-    """
-    means = np.full((len(spans), descriptors.weights.shape[1]), np.nan)
-    for row, (start, end) in enumerate(spans):
-        frames = _frames(descriptors, start, end)
-        if len(frames):
-            means[row] = descriptors.weights[frames].mean(axis=0)
-    return means
 
 
 def label_spans(
@@ -228,21 +210,9 @@ def _states(segments: Segments) -> list[_State]:
     return states
 
 
-def _frames(descriptors: Descriptors, start: float, end: float) -> np.ndarray:
-    """Indices of the frames with `start <= time < end`, at least the nearest one, that have weights."""
-    tiny = 1e-6 / descriptors.rate  # a boundary that stands on a frame but for rounding
-    first = int(np.ceil((start - descriptors.start) * descriptors.rate - tiny))
-    last = int(np.ceil((end - descriptors.start) * descriptors.rate - tiny))
-    if last <= first:
-        first = round(((start + end) / 2 - descriptors.start) * descriptors.rate)
-        last = first + 1
-    frames = np.arange(max(first, 0), min(last, descriptors.n_frames))
-    return frames[np.isfinite(descriptors.weights[frames]).all(axis=1)]
-
-
 def _thinned(descriptors: Descriptors, start: float, end: float) -> np.ndarray:
     """Some `CONFIDENCE_RATE` frames per second of the span, evenly spaced, at least one if there is any."""
-    frames = _frames(descriptors, start, end)
+    frames = frames_within(descriptors, start, end)
     count = min(len(frames), max(1, round((end - start) * CONFIDENCE_RATE)))
     return frames[((np.arange(count) + 0.5) * len(frames) / max(count, 1)).astype(int)]
 

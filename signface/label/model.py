@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -146,7 +146,7 @@ class TrainedModel:
             As `columns`.
         """
         self.columns(descriptors)
-        take = on_bases(descriptors, self.card.bases)
+        take = descriptors.on(self.card.bases)
         variant = DescriptorVariant(self.card.features, self.card.normalise)
         return take if variant.plain else variant.of(take, level)
 
@@ -162,14 +162,6 @@ class TrainedModel:
         if len(weights) == 0:
             return np.zeros((0, len(self.card.labels)))
         return self.estimator.predict_proba(weights)  # type: ignore[attr-defined]
-
-
-def on_bases(descriptors: Descriptors, bases: Sequence[str]) -> Descriptors:
-    """The take with these bases only, in this order."""
-    if descriptors.names == tuple(bases):
-        return descriptors
-    columns = [descriptors.names.index(name) for name in bases]
-    return replace(descriptors, weights=descriptors.weights[:, columns], names=tuple(bases))
 
 
 def _few(names: list[str], most: int = 5) -> str:

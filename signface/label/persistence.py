@@ -28,7 +28,7 @@ from signface.errors import SignfaceError
 from signface.files import shipped, whole_file
 from signface.label.labellers import SEQUENCE_NAMES
 from signface.label.model import Card, TrainedModel
-from signface.label.plain_archive import SCHEMA, read_plain
+from signface.label.plain_archive import SCHEMA, read_plain, read_schema
 from signface.label.variants import DescriptorVariant
 
 CARD = "signface.json"
@@ -38,10 +38,10 @@ LABELS, INTENSITY = "labels", "intensity"
 
 #: Types that a file may hold beside containers, arrays and plain values. None of them runs code of the file's choosing.
 TRUSTED = (
-    "signface.label.crf.ChainLabeller",
-    "signface.label.gru.RecurrentLabeller",
+    "signface.sequence.crf.ChainLabeller",
+    "signface.sequence.gru.RecurrentLabeller",
     "signface.label.intensity.IntensityClassifier",
-    "signface.label.sequence.SequenceLabeller",
+    "signface.sequence.hsmm.SequenceLabeller",
     "sklearn.calibration.CalibratedClassifierCV",
     "sklearn.calibration._CalibratedClassifier",
     "sklearn.calibration._SigmoidCalibration",
@@ -179,7 +179,7 @@ def _loaded(file: Path, quickly: bool) -> Any:
     import skops.io
     from skops.io.exceptions import UntrustedTypesFoundException
 
-    data = file.read_bytes()
+    data = _modernised(file)
     try:
         return skops.io.loads(data, trusted=list(TRUSTED))
     except UntrustedTypesFoundException as error:
@@ -189,6 +189,16 @@ def _loaded(file: Path, quickly: bool) -> Any:
             file=file,
             hint="use only files that signface train wrote",
         ) from error
+
+
+def _modernised(file: Path) -> bytes:
+    """The archive in a file, with the names of today in its schema."""
+    renewed = io.BytesIO()
+    with zipfile.ZipFile(file) as old, zipfile.ZipFile(renewed, "w") as new:
+        for name in old.namelist():
+            content = json.dumps(read_schema(old)).encode() if name == SCHEMA else old.read(name)
+            new.writestr(name, content)
+    return renewed.getvalue()
 
 
 def _hasten() -> None:

@@ -24,10 +24,24 @@ PROTOCOL = 2
 
 #: Models that consist of arrays and plain values.
 OURS = (
-    "signface.label.crf.ChainLabeller",
-    "signface.label.gru.RecurrentLabeller",
+    "signface.sequence.crf.ChainLabeller",
+    "signface.sequence.gru.RecurrentLabeller",
     "signface.label.intensity.IntensityClassifier",
 )
+
+#: Names of modules and of attributes in files that older versions wrote, and what they are called now.
+RENAMED_MODULES = {
+    "signface.label.crf": "signface.sequence.crf",
+    "signface.label.gru": "signface.sequence.gru",
+    "signface.label.sequence": "signface.sequence.hsmm",
+}
+RENAMED_ATTRIBUTES = {
+    "border_weight": "boundary_weight",
+    "border_classifier": "boundary_classifier",
+    "border_mean_": "boundary_mean_",
+    "border_scale_": "boundary_scale_",
+    "borders_": "boundaries_",
+}
 
 CONTAINERS = {"ListNode": list, "TupleNode": tuple}
 KEYS = {"builtins.str": str, "builtins.int": int}
@@ -45,13 +59,29 @@ def read_plain(archive: zipfile.ZipFile) -> Any:
     Exception
         Of any kind, where the archive is damaged.
     """
-    schema = json.loads(archive.read(SCHEMA))
+    schema = read_schema(archive)
     if schema.get("protocol") != PROTOCOL:
         return None
     try:
         return _value(schema, archive, {})
     except _OtherError:
         return None
+
+
+def read_schema(archive: zipfile.ZipFile) -> Any:
+    """The schema of a skops archive, with today's names of our modules and of what models hold."""
+
+    def visit(node: Any) -> Any:
+        if isinstance(node, list):
+            return [visit(item) for item in node]
+        if not isinstance(node, dict):
+            return node
+        renamed = {RENAMED_ATTRIBUTES.get(key, key): visit(value) for key, value in node.items()}
+        if renamed.get("__module__") in RENAMED_MODULES:
+            renamed["__module__"] = RENAMED_MODULES[renamed["__module__"]]
+        return renamed
+
+    return visit(json.loads(archive.read(SCHEMA)))
 
 
 def _name(node: dict[str, Any]) -> str:

@@ -15,7 +15,7 @@ from sklearn.base import BaseEstimator, TransformerMixin
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
-from signface.label.frame_features import Means
+from signface.frames import Means
 from signface.segment.energy import bridged
 
 #: name: what it is.

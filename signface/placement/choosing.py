@@ -18,12 +18,12 @@ import numpy as np
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
-from signface.placement.actors import Actor
 from signface.placement.clusters import Clusters, cluster_markers, trajectories
 from signface.placement.empirical import find_landmarks, with_head_markers
 from signface.placement.evaluation import skin_metric
 from signface.placement.selection import Criterion, Design, Reconstruction, ThinShell, placement_noise, select
 from signface.placement.sites import Rules, Sites, find_sites
+from signface.synth.actors import Actor
 
 METHODS = {
     "k-means": "k-means on trajectories",

@@ -19,10 +19,10 @@ import numpy as np
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
-from signface.placement.actors import Actor, Virtual
 from signface.solve.adaptation import MorphologicalAdaptation
-from signface.solve.gaussian_process import GaussianProcess, SparseOnlineGaussianProcess
 from signface.solve.methods import make_solver
+from signface.solve.rivals.gaussian_process import GaussianProcess, SparseOnlineGaussianProcess
+from signface.synth.actors import Actor, Virtual
 
 #: The mappings, and how they are called in reports.
 MAPPINGS = {

@@ -26,11 +26,11 @@ from signface.face.layout import MarkerLayout
 from signface.face.layout_files import read_layout
 from signface.face.model import FaceModel
 from signface.files import whole_file
-from signface.placement.actors import Actor
 from signface.placement.choosing import METHODS, Material, choose
 from signface.placement.empirical import EMPIRICAL, place_layout
 from signface.placement.evaluation import Errors, evaluate_layout
 from signface.placement.sites import Rules
+from signface.synth.actors import Actor
 
 #: Changes when a cell's numbers would: cells of an older study are then computed anew.
 VERSION = 1

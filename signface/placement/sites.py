@@ -22,7 +22,7 @@ from signface.render.still import face_camera, fragments, whole_mesh
 ZONES = {
     "lids": "the edges of the lids, 4 mm",
     "lips-inner": "the inner edge of the lips, 4 mm",
-    "nostrils": "the borders of the nostrils, 3 mm",
+    "nostrils": "the boundaries of the nostrils, 3 mm",
     "under-jaw": "below the edge of the jaw, and behind its angle",
 }
 _LIDS_MM, _LIPS_MM, _NOSTRIL_MM = 4.0, 4.0, 3.0

@@ -22,7 +22,7 @@ def draw_agreement(annotators: Mapping[str, pd.DataFrame], seconds: pd.DataFrame
     annotators : mapping of name to table
         `start_s, end_s, label`.
     seconds : DataFrame
-        What `signface.evaluate.agreement.confusion` returns for the first two.
+        What `signface.metrics.agreement.confusion` returns for the first two.
     title : str
     """
     from matplotlib.figure import Figure

@@ -89,7 +89,7 @@ def draw_rows_on(
     rate : float, optional
         Points of the curves per second, where that is fewer than the take has frames: for pages that hold many.
     marks : mapping of str to (K,) array, optional
-        Row to times of borders that are pointed out on it (seconds).
+        Row to times of boundaries that are pointed out on it (seconds).
     """
     from signface.segment.energy import energies
 

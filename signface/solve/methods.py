@@ -9,8 +9,8 @@ import numpy as np
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
-from signface.solve.direct import ThinShellDeformation
-from signface.solve.linear import Bounded, LeastSquares, NonNegative
+from signface.solve.rivals.direct import ThinShellDeformation
+from signface.solve.rivals.linear import Bounded, LeastSquares, NonNegative
 from signface.solve.solver import Solver
 from signface.solve.thin_shell import ThinShellSolver
 
@@ -74,7 +74,7 @@ def make_solver(
         return rivals[method](face, layout)
     if method == "direct-shell":
         return ThinShellDeformation(face, layout)
-    from signface.solve import regression
+    from signface.solve.rivals import regression
 
     learnt = {
         "rbf-network": regression.RbfNetwork,

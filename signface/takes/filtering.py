@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from signface.errors import SignfaceError
-from signface.takes.runs import runs
+from signface.frames import runs
 from signface.takes.take import Take
 
 #: Half of the power passes at this frequency. A lid closes in some 120 ms; its path keeps 99 % of its depth.

@@ -12,9 +12,9 @@ import warnings
 import numpy as np
 
 from signface.errors import SignfaceError
+from signface.frames import runs
 from signface.takes.recording import Recording
 from signface.takes.rigid import apply, flatness, inverse, rigid_transforms
-from signface.takes.runs import runs
 from signface.takes.take import Take
 
 #: Default limits in seconds: gaps up to the first are splined, up to the second taken from the neighbours.

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from signface.errors import SignfaceError
+from signface.frames import runs
 from signface.takes.rigid import apply, inverse, rigid_transforms
-from signface.takes.runs import runs
 from signface.takes.take import Take
 
 #: Speeds are means over this long, in seconds; a shorter rest is no rest.

@@ -67,7 +67,7 @@ def _recognise_text(opening: bytes) -> str | None:
         return "trc"
     if any(line.startswith(("NO_OF_MARKERS\t", "MARKER_NAMES\t")) for line in lines[:40]):
         return "qtm"
-    from signface.takes.table import header_cells
+    from signface.takes.formats.table import header_cells
 
     try:
         cells, _ = header_cells(first)
@@ -137,27 +137,27 @@ def open_recording(path: str | PathLike[str], *, unit: str | None = None) -> Tak
     kind = recognise(file)
     try:
         if kind == "c3d":
-            from signface.takes.c3d import open_c3d
+            from signface.takes.formats.c3d import open_c3d
 
             return open_c3d(file, unit=unit)
         if kind == "trc":
-            from signface.takes.trc import open_trc
+            from signface.takes.formats.trc import open_trc
 
             return open_trc(file, unit=unit)
         if kind == "qtm":
-            from signface.takes.qtm import open_qtm
+            from signface.takes.formats.qtm import open_qtm
 
             return open_qtm(file, unit=unit)
         if kind == "pose":
-            from signface.takes.pose import read_pose
+            from signface.takes.formats.pose import read_pose
 
             return read_pose(file, unit=unit)
         if kind == "table":
-            from signface.takes.table import open_table
+            from signface.takes.formats.table import open_table
 
             return open_table(file, unit=unit)
         if kind == "livelink":
-            from signface.takes.livelink import read_livelink
+            from signface.takes.formats.livelink import read_livelink
 
             return read_livelink(file)
         return read_weights(file)

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from signface.errors import SignfaceError
+from signface.frames import runs
 from signface.takes.rigid import apply, flatness, inverse, rigid_transforms
-from signface.takes.runs import runs
 from signface.takes.take import Take
 
 #: Markers nearer than this to one line (root mean square, mm) do not fix a rotation about it.

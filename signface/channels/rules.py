@@ -1,0 +1,233 @@
+"""What the face and the head do besides the affect: brows, eyes, gaze, nose, mouth, cheeks, head.
+
+- `read_channels`: the thresholds, from the shipped file or one's own.
+- `find_channels`: events of every channel of a take.
+- `find_intensities`: the intensity (1 to 3) of each stable segment.
+
+The thresholds stand in `models/channels/default.toml`, with what they mean.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from signface.channels.head import head_events
+from signface.descriptors import Descriptors
+from signface.errors import SignfaceError
+from signface.files import shipped
+from signface.frames import bridge, hysteresis, long_enough
+from signface.segment.segments import Segments
+
+#: Keys that a channel's table holds besides its values.
+CHANNEL_KEYS = {"description", "together", "measured_only"}
+VALUE_KEYS = {"description", "bases", "minus", "combine", "on", "off", "min_ms", "max_ms", "gap_ms"}
+
+
+@dataclass(frozen=True)
+class ChannelEvents:
+    """What was found on one channel.
+
+    Parameters
+    ----------
+    channel : str
+    description : str
+    values : mapping of str to str
+        Every value that the channel can hold, with its description: a closed vocabulary.
+    table : DataFrame
+        `start_s, end_s, value`, in order, without overlap; for the head also `cycles` and `amplitude_deg` (missing
+        for postures' cycles).
+    """
+
+    channel: str
+    description: str
+    values: Mapping[str, str]
+    table: pd.DataFrame
+
+
+def read_channels(name: str | PathLike[str] = "default") -> dict[str, dict[str, Any]]:
+    """The thresholds of a shipped name or of a TOML file of one's own.
+
+    Raises
+    ------
+    SignfaceError
+        The file is missing, is no TOML, or a value's table is incomplete.
+    """
+    known = shipped("channels", ".toml")
+    file = known.get(str(name), Path(name))
+    try:
+        content = tomllib.loads(file.read_text("utf-8"))
+    except OSError as error:
+        raise SignfaceError(
+            "no such file of channels", file=file, hint=f"shipped ones are {', '.join(known)}"
+        ) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise SignfaceError(f"is no TOML ({error})", file=file) from error
+    for channel, table in content.items():
+        if not isinstance(table, dict):
+            raise SignfaceError(f"{channel} is no table", file=file)
+        if channel in ("head", "intensity"):
+            continue
+        for value, rule in _values(table):
+            _check_rule(f"{channel}.{value}", rule, file)
+    return content
+
+
+def _check_rule(name: str, rule: object, file: Path) -> None:
+    if not isinstance(rule, dict):
+        raise SignfaceError(f"{name} is no table", file=file)
+    unknown, missing = sorted(set(rule) - VALUE_KEYS), sorted({"bases", "on", "off", "min_ms"} - set(rule))
+    if unknown or missing:
+        problem = f"the unknown key {unknown[0]}" if unknown else f"no {missing[0]}"
+        raise SignfaceError(f"[{name}] has {problem}", file=file, hint=f"the keys are {', '.join(sorted(VALUE_KEYS))}")
+    if rule["off"] > rule["on"]:
+        raise SignfaceError(f"[{name}] off is above on", file=file, hint="a value ends lower than it begins")
+
+
+def find_channels(
+    descriptors: Descriptors, channels: Mapping[str, Mapping[str, Any]] | None = None
+) -> list[ChannelEvents]:
+    """Events of every channel.
+
+    A channel none of whose bases the face has is left out, as is gaze when the weights were solved from markers, and
+    the head when its pose is unknown (the identity throughout).
+
+    Parameters
+    ----------
+    descriptors : Descriptors
+    channels : mapping, optional
+        What `read_channels` returns; the shipped thresholds when not given.
+    """
+    rules = read_channels() if channels is None else channels
+    solved = np.isfinite(descriptors.residual if descriptors.residual is not None else np.nan).any()
+    found = []
+    for channel, table in rules.items():
+        if channel == "intensity" or (table.get("measured_only") and solved):
+            continue
+        if channel == "head":
+            events = head_events(descriptors, dict(_values(table)))
+            if events is None:
+                continue
+        else:
+            signals = {
+                value: signal
+                for value, rule in _values(table)
+                if (signal := weight_signal(descriptors, rule)) is not None
+            }
+            if not signals:
+                continue
+            together = [tuple(pair) for pair in table.get("together", [])]
+            events = _weight_events(descriptors, signals, dict(_values(table)), together)
+        found.append(ChannelEvents(channel, str(table.get("description", channel)), _vocabulary(table), events))
+    return found
+
+
+def closed_vocabularies(channels: Mapping[str, Mapping[str, Any]]) -> list[ChannelEvents]:
+    """Every channel with the values that it can hold and no events."""
+    empty = pd.DataFrame(columns=["start_s", "end_s", "value"])
+    return [
+        ChannelEvents(channel, str(table.get("description", channel)), _vocabulary(table), empty)
+        for channel, table in channels.items()
+        if channel != "intensity"
+    ]
+
+
+def _vocabulary(table: Mapping[str, Any]) -> dict[str, str]:
+    """Every value of a channel and its description, those of pairs among them."""
+    values = {value: str(rule.get("description", "")) for value, rule in _values(table)}
+    return values | {joined: f"{first} and {second} together" for first, second, joined in table.get("together", [])}
+
+
+def find_intensities(
+    descriptors: Descriptors, segments: Segments, channels: Mapping[str, Mapping[str, Any]] | None = None
+) -> Segments:
+    """The segments with a column `intensity`: 1, 2 or 3 for stable ones, missing for transitions and neutral.
+
+    Parameters
+    ----------
+    descriptors : Descriptors
+    segments : Segments
+        Labelled.
+    channels : mapping, optional
+        What `read_channels` returns; its table `intensity` holds the two limits.
+    """
+    limits = (read_channels() if channels is None else channels)["intensity"]
+    table = segments.table.copy()
+    time, levels = descriptors.time, []
+    for row in table.itertuples(index=False):
+        frames = (time >= row.start_s) & (time < row.end_s)
+        strength = np.linalg.norm(np.nanmean(descriptors.weights[frames], axis=0)) if frames.any() else np.nan
+        stable = row.kind == "stable" and row.label != "N" and np.isfinite(strength)
+        levels.append(1 + (strength >= limits["marked"]) + (strength >= limits["extreme"]) if stable else None)
+    table["intensity"] = pd.array([None if level is None else int(level) for level in levels], dtype="Int64")
+    return segments.changed("find_intensities", table)
+
+
+def weight_signal(descriptors: Descriptors, rule: Mapping[str, Any]) -> np.ndarray | None:
+    """(F,) signal of a value: mean (or maximum) of its bases less the mean of `minus`; None without any base."""
+    bases = [descriptors.weight(base) for base in rule["bases"] if base in descriptors.names]
+    if not bases:
+        return None
+    signal = np.max(bases, axis=0) if rule.get("combine") == "max" else np.mean(bases, axis=0)
+    minus = [descriptors.weight(base) for base in rule.get("minus", []) if base in descriptors.names]
+    return signal - np.mean(minus, axis=0) if minus else signal
+
+
+def _weight_events(
+    descriptors: Descriptors,
+    signals: Mapping[str, np.ndarray],
+    rules: Mapping[str, Mapping[str, Any]],
+    together: list[tuple[str, ...]],
+) -> pd.DataFrame:
+    rate = descriptors.rate
+    active: dict[str, np.ndarray] = {}
+    for value, signal in signals.items():
+        rule = rules[value]
+        on = hysteresis(signal, rule["on"], rule["off"])
+        on = bridge(on, round(rule.get("gap_ms", 0) / 1000 * rate))
+        active[value] = long_enough(on, rule["min_ms"] / 1000 * rate, rule.get("max_ms", np.inf) / 1000 * rate)
+    names = list(active)
+    strength = np.array([np.where(active[name], signals[name] / rules[name]["on"], -np.inf) for name in names])
+    label = np.where(np.isfinite(strength).any(axis=0), np.argmax(strength, axis=0), -1)
+    for index, (first, second, _) in enumerate(together):
+        if first in active and second in active:
+            label[active[first] & active[second]] = len(names) + index
+    values = [*names, *(joined for _, _, joined in together)]
+    shortest = min(rules[name]["min_ms"] for name in names) / 1000 * rate
+    rows = [
+        (descriptors.start + start / rate, descriptors.start + end / rate, values[code])
+        for start, end, code in _runs(label, shortest)
+    ]
+    return pd.DataFrame(rows, columns=["start_s", "end_s", "value"])
+
+
+def _runs(label: np.ndarray, shortest: float) -> Iterator[tuple[int, int, int]]:
+    """Stretches of one label (not -1); a fragment shorter than `shortest` frames goes to the run it touches.
+
+    Fragments appear where two values that are each long enough overlap a little.
+    """
+    edges = np.flatnonzero(np.diff(label)) + 1
+    starts = [0, *edges.tolist()] if len(label) else []
+    runs = [[start, end, int(label[start])] for start, end in zip(starts, [*starts[1:], len(label)])]
+    merged: list[list[int]] = []
+    for start, end, code in runs:
+        follows = merged and merged[-1][1] == start and merged[-1][2] >= 0
+        if follows and (merged[-1][2] == code or (code >= 0 and end - start < shortest)):
+            merged[-1][1] = end
+        elif follows and code >= 0 and merged[-1][1] - merged[-1][0] < shortest:
+            merged[-1][1:] = [end, code]  # a fragment with nothing before it
+        else:
+            merged.append([start, end, code])
+    yield from ((start, end, code) for start, end, code in merged if code >= 0)
+
+
+def _values(table: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """The values of a channel's table and their rules."""
+    return ((key, rule) for key, rule in table.items() if key not in CHANNEL_KEYS)

@@ -1,0 +1,202 @@
+"""Annotated takes, as what classifiers learn from.
+
+- `Example`: a solved take with its reference annotation.
+- `training_frames`: the frames of one that a classifier learns from.
+- `frame_table`: those of many, with the take and the signer of each, for scikit-learn.
+- `signer_levels`: what each signer's weights are normalised by.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from signface.descriptors import Descriptors
+from signface.errors import SignfaceError
+from signface.label.variants import DescriptorVariant, SignerLevel, signer_level
+from signface.label.vocabulary import AFFECTS
+from signface.segment.segments import Segments
+
+#: Frames per second kept for training: a held face hardly changes in a tenth of a second.
+TRAINING_RATE = 10.0
+
+
+class FrameTable(NamedTuple):
+    """Frames as scikit-learn wants them.
+
+    Parameters
+    ----------
+    X : (K, columns) array
+        Descriptors of the frames.
+    y : (K,) array of str
+        Their labels.
+    takes, signers : (K,) arrays of str
+        Where each frame is from: groups for `GroupKFold`, `LeaveOneGroupOut` and the like.
+    """
+
+    X: np.ndarray
+    y: np.ndarray
+    takes: np.ndarray
+    signers: np.ndarray
+
+
+@dataclass(frozen=True)
+class Example:
+    """A solved take with its reference annotation.
+
+    Parameters
+    ----------
+    take : str
+        Name of the take, unique in its corpus.
+    signer, kind : str
+        As in the corpus (`IE`, `SE`, `EU` or any other word).
+    descriptors : Descriptors
+    reference : Segments
+        With the column `label`: labels of stable segments, names of transitions; perhaps `intensity` (1, 2 or 3).
+    sentence : str, optional
+        What is signed, where the corpus names it: takes of one sentence are alike.
+    """
+
+    take: str
+    signer: str
+    kind: str
+    descriptors: Descriptors
+    reference: Segments
+    sentence: str | None = None
+
+    def __post_init__(self) -> None:
+        if not self.reference.labelled:
+            raise SignfaceError(f"{self.take}: its reference annotation has no labels")
+        unknown = sorted({str(label) for label in self.stable["label"]} - set(AFFECTS))
+        if unknown:
+            raise SignfaceError(
+                f"{self.take}: its reference annotation has the unknown label {', '.join(unknown)}",
+                hint=f"the labels of stable segments are {' '.join(AFFECTS)}",
+            )
+
+    @property
+    def stable(self) -> pd.DataFrame:
+        """The rows of the reference's stable segments."""
+        return self.reference.table[self.reference.table["kind"] == "stable"]
+
+
+def training_frames(
+    example: Example,
+    bases: Sequence[str],
+    *,
+    rate: float = TRAINING_RATE,
+    variant: DescriptorVariant | None = None,
+    level: SignerLevel | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Weights and labels of evenly spaced frames of the reference's stable segments.
+
+    Neighbouring frames at 200 Hz are nearly equal: `rate` frames per second are kept (at least the middle one of
+    each segment), which costs no accuracy worth the name and makes the support vector machines train in seconds.
+    Frames without weights are left out.
+
+    Parameters
+    ----------
+    example : Example
+    bases : sequence of str
+        The columns wanted, in this order.
+    rate : float
+        Frames kept per second of stable segment (Hz).
+    variant, level : optional
+        What is made of the weights, and by which level of the signer it is normalised; the weights themselves when
+        not given.
+
+    Returns
+    -------
+    (K, columns) weights and (K,) labels.
+    """
+    take = example.descriptors.on(bases)
+    descriptors = take if variant is None else variant.of(take, level)
+    known = np.isfinite(descriptors.weights).all(axis=1)
+    time = descriptors.time
+    frames, labels = [], []
+    for start, end, label in example.stable[["start_s", "end_s", "label"]].itertuples(index=False):
+        inside = np.flatnonzero((time >= start) & (time < end) & known)
+        if len(inside) == 0:
+            continue
+        count = max(1, round(len(inside) / descriptors.rate * rate))
+        picked = inside[((np.arange(count) + 0.5) * len(inside) / count).astype(int)]
+        frames.append(descriptors.weights[picked])
+        labels += [label] * count
+    if not frames:
+        return np.zeros((0, descriptors.weights.shape[1])), np.zeros(0, dtype=str)
+    return np.concatenate(frames), np.array(labels, dtype=str)
+
+
+def common_bases(examples: Sequence[Example]) -> tuple[str, ...]:
+    """The bases of the examples.
+
+    Raises
+    ------
+    SignfaceError
+        Two takes have other bases; the message names them.
+    """
+    first = examples[0]
+    for other in examples[1:]:
+        if set(other.descriptors.names) != set(first.descriptors.names):
+            differ = sorted(set(other.descriptors.names) ^ set(first.descriptors.names))
+            raise SignfaceError(
+                f"the takes {first.take} and {other.take} were solved with other bases ({', '.join(differ[:5])})",
+                hint="train on takes of one face",
+            )
+    return first.descriptors.names
+
+
+def signer_levels(examples: Sequence[Example]) -> dict[str, SignerLevel]:
+    """The level of each signer, from all of these takes of theirs; no label is looked at."""
+    signers = sorted({example.signer for example in examples})
+    return {name: signer_level([e.descriptors for e in examples if e.signer == name]) for name in signers}
+
+
+def frame_table(
+    examples: Sequence[Example],
+    *,
+    features: Sequence[str] = ("weights",),
+    normalise: str = "none",
+    rate: float = TRAINING_RATE,
+) -> FrameTable:
+    """Frames of the stable segments of annotated takes, for scripts with scikit-learn.
+
+    Frames of one take are alike, and frames of one signer are: whoever splits them must keep them together, by
+    `groups=takes` or, to know how it does on somebody else, `groups=signers`.
+
+    Parameters
+    ----------
+    examples : sequence of Example
+    features, normalise : optional
+        As in `signface.label.variants.DescriptorVariant`; signers are normalised by these takes of theirs.
+    rate : float
+        As in `training_frames`.
+
+    Raises
+    ------
+    SignfaceError
+        There is no example, or takes have other bases.
+
+    Examples
+    --------
+    >>> from sklearn.model_selection import LeaveOneGroupOut, cross_val_score
+    >>> X, y, takes, signers = frame_table(examples)  # doctest: +SKIP
+    >>> cross_val_score(make_labeller("forest"), X, y, groups=signers, cv=LeaveOneGroupOut())  # doctest: +SKIP
+    """
+    if not examples:
+        raise SignfaceError("there is no annotated take", hint="name other kinds or another signer")
+    bases = common_bases(examples)
+    variant = DescriptorVariant(features, normalise).check()
+    levels = signer_levels(examples) if normalise == "signer" else {}
+    pairs = [training_frames(e, bases, rate=rate, variant=variant, level=levels.get(e.signer)) for e in examples]
+    counts = [len(labels) for _, labels in pairs]
+    return FrameTable(
+        np.concatenate([frames for frames, _ in pairs]),
+        np.concatenate([labels for _, labels in pairs]),
+        np.repeat(np.array([e.take for e in examples], dtype=str), counts),
+        np.repeat(np.array([e.signer for e in examples], dtype=str), counts),
+    )

@@ -1,0 +1,134 @@
+"""What is chosen, and what is known of a classifier, from takes left out within the training takes.
+
+- `GRIDS`: the parameters that a search goes through.
+- `search_parameters`: the best of them.
+- `judge_left_out`: labels and confidences of segments of takes that were left out.
+
+Neither sees a test take: whoever tests gives them the training takes only, and so nests the one in the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from sklearn.model_selection import ParameterGrid
+
+from signface.errors import SignfaceError
+from signface.label.labelling import label_spans
+from signface.label.model import TrainedModel
+from signface.learn.examples import Example, signer_levels
+from signface.learn.folds import groups_of, inner_folds
+
+#: classifier: what a search tries, parameter by parameter.
+GRIDS: dict[str, dict[str, list[Any]]] = {
+    "knn1": {"weights": ["uniform"], "metric": ["euclidean", "manhattan", "cosine"]},
+    "knn3": {"weights": ["uniform", "distance"], "metric": ["euclidean", "manhattan", "cosine"]},
+    "svm-linear": {"C": [0.1, 1.0, 10.0]},
+    "svm-rbf": {"C": [0.1, 1.0, 10.0], "gamma": [0.1, 0.3, 1.0, 3.0]},
+    "forest": {"min_samples_leaf": [1, 3, 10], "max_features": [0.05, "sqrt", 0.4]},
+    "crf": {"penalty": [3e-4, 1e-3, 3e-3]},
+    # A sequence model is decoded anew with each of these; its frame classifier is trained once a fold.
+    "sequence": {"boundary_weight": [0.7, 1.0, 1.4], "rarity": [0.4, 0.6, 0.8]},
+}
+
+#: Trains on the takes given, with the parameters given.
+Fit = Callable[[Sequence[Example], Mapping[str, Any]], TrainedModel]
+
+
+def search_parameters(
+    examples: Sequence[Example], classifier: str, fit: Fit, *, folds: int = 4
+) -> tuple[dict[str, Any], float]:
+    """The parameters that do best on training takes left out, and how well they do there.
+
+    Classifiers of segments are scored by balanced accuracy on the left-out takes' stable segments, sequence models by
+    the share of their frames that get the right label or are rightly called a transition. The first of equals wins.
+
+    Parameters
+    ----------
+    examples : sequence of Example
+        The training takes.
+    classifier : str
+    fit : callable
+        See `Fit`.
+    folds : int
+        At most as many as there are groups (`signface.learn.folds`).
+
+    Returns
+    -------
+    (parameters, score)
+
+    Raises
+    ------
+    SignfaceError
+        There are too few takes to leave any out.
+    """
+    pairs = inner_folds(examples, folds=folds)
+    if not pairs:
+        raise SignfaceError(
+            "there are too few training takes to search over", hint="train on two takes or more, or without --search"
+        )
+    sequential = classifier not in GRIDS
+    grid = list(ParameterGrid(GRIDS["sequence" if sequential else classifier]))
+    scores = _sequence_scores(pairs, grid, fit) if sequential else [_balanced_accuracy(pairs, one, fit) for one in grid]
+    best = int(np.argmax(np.round(scores, 6)))
+    return dict(grid[best]), float(scores[best])
+
+
+def judge_left_out(
+    pairs: Sequence[tuple[list[Example], list[Example]]], fit: Fit, parameters: Mapping[str, Any]
+) -> pd.DataFrame:
+    """Labels of the stable segments of takes left out, by what was trained on the others.
+
+    Parameters
+    ----------
+    pairs : sequence of pairs of lists of Example
+        What `signface.learn.folds.inner_folds` returns.
+    fit, parameters :
+        As in `search_parameters`.
+
+    Returns
+    -------
+    DataFrame
+        `signer, take, group, truth, found, confidence`, a row for each segment.
+    """
+    tables = []
+    for kept, left_out in pairs:
+        model = fit(kept, parameters)
+        levels = signer_levels(left_out) if model.card.normalise == "signer" else {}
+        groups = groups_of(left_out, by_signer=len({e.signer for e in (*kept, *left_out)}) > 1)
+        for example, group in zip(left_out, groups, strict=True):
+            spans = example.stable[["start_s", "end_s"]].to_numpy(float)
+            found, sure = label_spans(example.descriptors, spans, model, level=levels.get(example.signer))
+            table = pd.DataFrame({"truth": example.stable["label"].to_numpy(object), "found": found})
+            tables.append(table.assign(confidence=sure, signer=example.signer, take=example.take, group=group))
+    return pd.concat(tables, ignore_index=True)
+
+
+def balanced_accuracy(table: pd.DataFrame) -> float:
+    """Share of right segments of each label of the reference, averaged."""
+    return float((table["truth"] == table["found"]).groupby(table["truth"]).mean().mean())
+
+
+def _balanced_accuracy(
+    pairs: Sequence[tuple[list[Example], list[Example]]], parameters: Mapping[str, Any], fit: Fit
+) -> float:
+    return balanced_accuracy(judge_left_out(pairs, fit, parameters))
+
+
+def _sequence_scores(
+    pairs: Sequence[tuple[list[Example], list[Example]]], grid: Sequence[Mapping[str, Any]], fit: Fit
+) -> list[float]:
+    """Score of each set of parameters: the share of frames rightly labelled, over all left-out takes."""
+    totals = np.zeros(len(grid))
+    for kept, left_out in pairs:
+        model = fit(kept, {})
+        levels = signer_levels(left_out) if model.card.normalise == "signer" else {}
+        takes = [model.seen(e.descriptors, levels.get(e.signer)) for e in left_out]
+        estimator: Any = model.estimator
+        for number, parameters in enumerate(grid):
+            estimator.set_params(**parameters)
+            totals[number] += len(left_out) * estimator.score(takes, [e.reference for e in left_out])
+    return (totals / sum(len(left_out) for _, left_out in pairs)).tolist()

@@ -1,0 +1,205 @@
+"""The report of an evaluation: a page that needs nothing else, with its figures and tables as files beside it.
+
+- `write_report`: the whole folder.
+- `evaluation_page`: the page alone, as text.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from signface.files import whole_file
+from signface.learn.examples import Example
+from signface.metrics.segmentation import match_boundaries
+from signface.report.evaluation import figures, tables
+from signface.report.evaluation.evaluated import Drawn, Evaluated, figure_name, takes_table
+from signface.report.evaluation.importance import draw_importance
+from signface.report.evaluation.page import evaluation_page
+from signface.report.evaluation.worst_takes import FAR_S, TakeVerdict
+from signface.report.figure_files import save_vector
+
+if TYPE_CHECKING:
+    pass
+
+
+def write_report(evaluated: Evaluated, folder: Path) -> Path:
+    """Write `report.html`, `metrics.json`, the tables as CSV and the figures as SVG and PDF.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    SignfaceError
+        The folder cannot be written.
+    """
+    with whole_file(folder / "metrics.json") as temporary:
+        text = json.dumps(evaluated.metrics, indent=1, ensure_ascii=False) + "\n"
+        temporary.write_text(text, encoding="utf-8")
+    drawn = draw_all(evaluated)
+    for figure in [figure for own in drawn.values() for figure in own]:
+        save_vector(figure.figure, figure.svg, folder / "figures", figure.name)
+    for name, table in files(evaluated).items():
+        with whole_file(folder / f"{name}.csv") as temporary:
+            table.to_csv(temporary, index=False, lineterminator="\n")
+    with whole_file(folder / "report.html") as temporary:
+        temporary.write_text(evaluation_page(evaluated, drawn), encoding="utf-8")
+    return folder / "report.html"
+
+
+def files(evaluated: Evaluated) -> dict[str, pd.DataFrame]:
+    """Every table, by the name of its file."""
+    found = {}
+    results, signers, pairs, curves, importance = [], [], [], [], []
+    for protocol, part in evaluated.parts.items():
+        results.append(tables.results_table(part["classifiers"]).assign(protocol=protocol))
+        signers.append(tables.by_signer_table(part["protocol"]).assign(protocol=protocol))
+        pairs.append(tables.mcnemar_table(part["mcnemar"]).assign(protocol=protocol))
+        curves.append(pd.DataFrame(evaluated.metrics["learning_curve"].get(protocol, [])).assign(protocol=protocol))
+        for name, sections in part["classifiers"].items():
+            found[f"confusion_{protocol}_{name}"] = tables.confusion_table(sections)
+    for name, rows in evaluated.metrics["importance"].items():
+        importance.append(pd.DataFrame(rows).assign(classifier=name))
+    named = {
+        "results": results,
+        "by_signer": signers,
+        "segmentation": [tables.segmentation_table(evaluated.metrics["segmentation_by_kind"])],
+        "mcnemar": pairs,
+        "learning_curve": curves,
+        "importance": importance,
+        "takes": [takes_table(evaluated.verdicts)],
+        "recordings": [pd.DataFrame(evaluated.facts["recordings"])],
+    }
+    for name, frames in named.items():
+        kept = [frame for frame in frames if len(frame)]
+        if kept:
+            found[name] = pd.concat(kept, ignore_index=True)
+    return found
+
+
+def draw_all(evaluated: Evaluated) -> dict[str, list[Drawn]]:
+    """Section of the page to its figures."""
+    metrics, parts = evaluated.metrics, evaluated.parts
+    classifiers = {protocol: part["classifiers"] for protocol, part in parts.items()}
+    main = next(iter(parts))
+    drawn: dict[str, list[Drawn]] = {
+        "accuracy": [
+            Drawn(
+                "accuracy",
+                figures.draw_accuracy(classifiers),
+                "Bars: accuracy of each classifier on manual and automatic segments; the table below has the numbers.",
+                "Share of segments with the reference’s label (figure 4.4 of the thesis). Whiskers: 95 % of what other "
+                "draws of whole takes give.",
+            )
+        ],
+        "segmentation": [
+            Drawn(
+                "segmentation",
+                figures.draw_segmentation(tables.segmentation_table(metrics["segmentation_by_kind"])),
+                "Boundary F1 of each method and kind of take at three tolerances; the table below has the numbers.",
+                "Boundaries found within three distances of one of the reference. The energies learn nothing and are "
+                "shown on every kind; the others on what they were tested on, after labelling, when neighbours of "
+                "one label have become one segment.",
+            )
+        ],
+        "confusions": [],
+        "confidence": [],
+        "curve": [],
+        "importance": [],
+    }
+    for protocol in parts:
+        panels = figures.section_titles(classifiers[protocol], "automatic_segments")
+        if panels:
+            drawn["confusions"].append(
+                Drawn(
+                    f"confusions_{protocol}",
+                    figures.draw_confusions(panels),
+                    f"Confusion matrices on automatic segments, {tables.PROTOCOL_TITLES[protocol]}; the tables below "
+                    "have the numbers.",
+                    f"Automatic segments, {tables.PROTOCOL_TITLES[protocol]}: how many of each label of the reference "
+                    "(rows) were called what (columns). The darker, the larger the share of the row. Above each: the "
+                    "classifier and its accuracy.",
+                )
+            )
+    curves = {name: bins for name, bins in metrics["reliability"].get(main, {}).items() if bins}
+    if curves:
+        drawn["confidence"].append(
+            Drawn(
+                "reliability",
+                figures.draw_reliability(curves),
+                "Lines: share of automatic segments that are right, against the confidence of the classifier.",
+                f"Share of automatic segments that are right against their confidence, {tables.PROTOCOL_TITLES[main]}. "
+                "On the dashed line a confidence means what it says; below it, it promises too much. "
+                f"Shares of fewer than {figures.LEAST_BIN} segments are not drawn.",
+            )
+        )
+    points = [pd.DataFrame(own).assign(protocol=protocol) for protocol, own in metrics["learning_curve"].items() if own]
+    if points:
+        drawn["curve"].append(
+            Drawn(
+                "learning_curve",
+                figures.draw_learning_curve(pd.concat(points, ignore_index=True)),
+                "Lines: accuracy on manual segments against the number of training takes or signers; the table below "
+                "has the numbers.",
+                "Accuracy on the annotator’s segments against what was trained on, mean over random orders; bands: the "
+                "least and the most of them. The last point is everything. The vertical axis is cut.",
+            )
+        )
+    name = evaluated.best if evaluated.best in metrics["importance"] else next(iter(metrics["importance"]), None)
+    if name:
+        drawn["importance"].append(
+            Drawn(
+                "importance",
+                draw_importance(pd.DataFrame(metrics["importance"][name]), evaluated.face, title=name),
+                f"Bars: accuracy that {name} loses without each base, and the face painted with it; the table below "
+                "has the numbers.",
+                f"What “{name}” ({tables.PROTOCOL_TITLES[main]}) loses when a base is dealt out anew among the "
+                "segments of the test takes, left and right together. Whiskers: 95 % of other draws of takes. The skin "
+                "is painted with the sum over the bases, each by how far it moves the skin.",
+            )
+        )
+    drawn["worst"] = [_take(evaluated, verdict) for verdict in evaluated.worst if _drawable(evaluated, verdict)]
+    drawn["gallery"] = [_take(evaluated, verdict) for verdict in evaluated.gallery if _drawable(evaluated, verdict)]
+    return drawn
+
+
+def _drawable(evaluated: Evaluated, verdict: TakeVerdict) -> bool:
+    """Whether a take has an energy curve at all."""
+    descriptors = _example(evaluated, verdict).descriptors
+    return descriptors.n_frames >= 3 and bool(np.isfinite(descriptors.weights).all(axis=1).any())
+
+
+def _example(evaluated: Evaluated, verdict: TakeVerdict) -> Example:
+    return next(example for example in evaluated.examples if example.take == verdict.take)
+
+
+def _take(evaluated: Evaluated, verdict: TakeVerdict) -> Drawn:
+    """The timeline of a take: a row for each protocol, and the reference."""
+    example = _example(evaluated, verdict)
+    short = {"within": "same signer", "across": "other signers"}
+    rows = {
+        short.get(protocol, protocol): own[evaluated.best][verdict.take]
+        for protocol, own in evaluated.found.items()
+        if verdict.take in own.get(evaluated.best, {})
+    }
+    first = next(iter(rows))
+    boundaries, found, pairs = match_boundaries(example.reference.table, rows[first].table, tolerance_s=FAR_S)
+    marks = {
+        "reference": np.delete(boundaries, [i for i, _ in pairs]),
+        first: np.delete(found, [j for _, j in pairs]),
+    }
+    rows["reference"] = example.reference
+    return Drawn(
+        figure_name(verdict.take),
+        figures.draw_take(example.descriptors, rows, marks=marks),
+        f"Timeline of {verdict.take}: energies above, the segments of {evaluated.best} and of the reference below. "
+        + ("; ".join(verdict.reasons) or "Nothing is wrong."),
+        "",
+    )

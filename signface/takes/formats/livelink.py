@@ -1,0 +1,130 @@
+"""Live Link Face CSV: the 52 ARKit weights that an iPhone measures, with the head's rotation.
+
+Columns `Timecode, BlendshapeCount`, 52 weights in UpperCamel (`EyeBlinkLeft`), then `HeadYaw, HeadPitch, HeadRoll` and
+the rotation of each eye. The timecode is `hours:minutes:seconds:frame.part`, frames counted at the recording's rate.
+"""
+
+from __future__ import annotations
+
+import re
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from signface.descriptors import Descriptors
+from signface.errors import SignfaceError
+from signface.takes.formats.table import header_cells
+from signface.takes.formats.text import numbers, read_text
+
+TIMECODE = re.compile(r"^\s*(\d+):(\d+):(\d+)[:;](\d+)(\.\d+)?\s*$")
+ROTATIONS = ("HeadYaw", "HeadPitch", "HeadRoll")
+#: Rates at which phones record; a timecode cannot tell 29.97 from 30.
+USUAL_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 120.0)
+USUAL_RATE = 60.0
+
+
+def base_name(column: str) -> str:
+    """The ARKit name of a column: `EyeBlinkLeft` is `eyeBlinkLeft`."""
+    return column[:1].lower() + column[1:]
+
+
+def _frames(cells: list[str], file: Path) -> tuple[np.ndarray, float]:
+    """(F,) whole number of the frame of each row, from 0 and rising, and the rate in Hz, from timecodes."""
+    matches = [TIMECODE.match(cell) for cell in cells]
+    wrong = next((row for row, match in enumerate(matches) if match is None), None)
+    if wrong is not None:
+        raise SignfaceError(f"row {wrong + 2} has no timecode ({cells[wrong][:20]!r})", file=file)
+    parts = np.array([[float(part or 0) for part in match.groups()] for match in matches if match])
+    if len(parts) < 2:
+        raise SignfaceError("has one frame, and a rate needs two", file=file, hint="export more of the recording")
+    seconds = parts[:, :3] @ (3600.0, 60.0, 1.0)
+    # Within a second the frame numbers rise to the rate less one. A take within one second does not show it.
+    highest = parts[:, 3].max() + 1
+    least = highest if (np.diff(seconds) > 0).any() else max(highest, USUAL_RATE)
+    counted = min((rate for rate in USUAL_RATES if rate >= least), default=highest)
+    whole = seconds * counted + parts[:, 3]
+    if (np.diff(whole) > 0).mean() > 0.9:
+        frames, rate = whole, counted  # the parts of frames only say how far the camera runs beside the clock
+    else:
+        times = seconds + (parts[:, 3] + parts[:, 4]) / counted
+        step = float(np.median(np.diff(times)))
+        if step <= 0:
+            raise SignfaceError("its timecodes do not rise", file=file, hint="export it again")
+        rate = min(USUAL_RATES, key=lambda usual: abs(usual * step - 1))
+        rate = rate if abs(rate * step - 1) < 0.03 else 1 / step
+        frames = np.round((times - times[0]) * rate)
+    frames = frames - frames[0]
+    if (np.diff(frames) < 0).any():
+        raise SignfaceError("its timecodes do not rise", file=file, hint="export it again")
+    if frames[-1] > 20 * len(frames) + 1000:
+        raise SignfaceError("its timecodes leap: more frames are lost than kept", file=file, hint="record it again")
+    return frames.astype(np.int64), rate
+
+
+def _rotations(angles: np.ndarray) -> np.ndarray:
+    """(F, 4, 4) head poses from (F, 3) yaw, pitch and roll in radians (degrees when beyond a turn).
+
+    Yaw turns about the vertical axis y, pitch about x, roll about z, in this order from the outside in.
+    """
+    from scipy.spatial.transform import Rotation
+
+    angles = np.nan_to_num(angles, nan=0.0)
+    poses = np.tile(np.eye(4), (len(angles), 1, 1))
+    degrees = bool(np.abs(angles).max(initial=0.0) > np.pi)
+    poses[:, :3, :3] = Rotation.from_euler("YXZ", angles, degrees=degrees).as_matrix()
+    return poses
+
+
+def read_livelink(path: str | PathLike[str]) -> Descriptors:
+    """Read the weights of a Live Link Face CSV.
+
+    Bases get their ARKit names (`eyeBlinkLeft`); `tongueOut` is left out, as in the default face. Frames the phone
+    dropped are filled by straight lines between their neighbours, so that the rate is even. Positions of the head are
+    not in the file: poses are rotations only.
+
+    Raises
+    ------
+    SignfaceError
+        The columns are others, a row is cut short or holds words, or the timecodes do not rise.
+    """
+    file = Path(path)
+    lines = [line for line in read_text(file).splitlines() if line.strip()]
+    columns, separator = header_cells(lines[0])
+    if [column.lower() for column in columns[:2]] != ["timecode", "blendshapecount"]:
+        raise SignfaceError("is no Live Link Face CSV", file=file, hint="its first column is Timecode")
+    if len(set(columns)) != len(columns):
+        raise SignfaceError("has columns of one name", file=file, hint="export it again")
+    bases = [
+        column
+        for column in columns[2:]
+        if column and not re.search(r"(Yaw|Pitch|Roll)$", column) and column.lower() != "tongueout"
+    ]
+    if not bases:
+        raise SignfaceError("has no weights", file=file, hint="export it again")
+    if len(lines) < 2:
+        raise SignfaceError("the file has no frames, only a header", file=file, hint="export it again")
+    rows = [line.split(separator, 1) for line in lines[1:]]
+    frame, rate = _frames([row[0] for row in rows], file)
+    cells = [(number, row[1]) for number, row in enumerate(rows, start=2) if len(row) > 1 and row[1].strip()]
+    values = numbers(cells, len(columns) - 1, separator, file)
+    if len(values) != len(frame):
+        raise SignfaceError("a row has a timecode and nothing else", file=file, hint="the file may be cut short")
+    kept = np.flatnonzero(np.diff(frame, prepend=-1) > 0)
+    even = np.arange(frame[-1] + 1)
+    wanted = [columns.index(column) - 1 for column in (*bases, *(own for own in ROTATIONS if own in columns))]
+    filled = np.column_stack([np.interp(even, frame[kept], values[kept, place]) for place in wanted])
+    notes = [f"read {file.name} (Live Link Face, {rate:g} Hz)"]
+    if len(even) > len(kept):
+        notes.append(f"filled {len(even) - len(kept)} dropped frames")
+    head = None
+    if all(rotation in columns for rotation in ROTATIONS):
+        head = _rotations(filled[:, len(bases) :])
+    return Descriptors(
+        weights=filled[:, : len(bases)],
+        names=tuple(base_name(column) for column in bases),
+        rate=rate,
+        head=head,
+        name=file.stem,
+        history=tuple(notes),
+    )

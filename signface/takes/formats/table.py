@@ -1,0 +1,111 @@
+"""CSV with one row a frame: `time_s`, then `LABEL_x, LABEL_y, LABEL_z` for each marker.
+
+- `open_table`, `read_table`, `write_table`.
+"""
+
+from __future__ import annotations
+
+import csv
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from signface.errors import SignfaceError
+from signface.files import whole_file
+from signface.takes.formats.text import TextFile, TextRows, even_rate, marker_rows
+from signface.takes.labels import clean_labels
+from signface.takes.recording import TakeFile
+from signface.takes.take import Take
+
+AXES = ("x", "y", "z")
+
+
+def header_cells(line: str) -> tuple[list[str], str]:
+    """The cells of a header line and the separator that it uses (`,`, `;` or tab)."""
+    separator = max((",", ";", "\t"), key=line.count)
+    return [cell.strip() for cell in next(csv.reader(line.splitlines(), delimiter=separator), [])], separator
+
+
+def _markers(columns: list[str], file: Path) -> tuple[list[str], np.ndarray]:
+    """Labels in order, and the (M, 3) column numbers of their coordinates."""
+    places: dict[str, list[int]] = {}
+    order: list[tuple[str, list[int]]] = []
+    for number, column in enumerate(columns[1:], start=1):
+        label, _, axis = column.rpartition("_")
+        if axis.lower() not in AXES or not label:
+            raise SignfaceError(
+                f"the column {column[:40]!r} is no coordinate of a marker",
+                file=file,
+                hint="its columns are time_s and LABEL_x, LABEL_y, LABEL_z for each marker",
+            )
+        place = AXES.index(axis.lower())
+        if label not in places or places[label][place] >= 0:
+            places[label] = [-1, -1, -1]
+            order.append((label, places[label]))
+        places[label][place] = number
+    broken = [label for label, own in order if min(own) < 0]
+    if broken:
+        raise SignfaceError(f"not all of x, y and z are there for {', '.join(broken[:5])}", file=file)
+    if not order:
+        raise SignfaceError("has no markers", file=file, hint="its columns are time_s and LABEL_x, LABEL_y, LABEL_z")
+    return [label for label, _ in order], np.array([own for _, own in order])
+
+
+def open_table(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
+    """Open a wide CSV (separated by commas, semicolons or tabs): `time_s`, then three columns a marker.
+
+    Empty cells are missing markers. The unit is inferred from the spread of the markers unless it is given.
+
+    Raises
+    ------
+    SignfaceError
+        The columns are others, a row is cut short, a cell is no number, or the times do not rise evenly.
+    """
+    file = Path(path)
+    text = TextFile(file)
+    columns, separator = header_cells(text.lines(0, 1)[0][1])
+    if not columns or columns[0].lower() not in ("time_s", "time", "time (s)"):
+        raise SignfaceError("its first column is not time_s", file=file, hint="put the time in seconds there")
+    while columns and not columns[-1]:
+        columns.pop()
+    labels, places = _markers(columns, file)
+    rows = TextRows(text, 1, len(columns), separator)
+    times = rows.column(0)
+    rate = even_rate(times, file)
+    kept, names, notes = clean_labels(labels)
+    if not kept:
+        raise SignfaceError("none of the markers has a label", file=file, hint="label the markers")
+    return marker_rows(
+        rows,
+        places[kept],
+        names,
+        rate,
+        units=None,
+        unit=unit,
+        start=float(times[0]),
+        history=(f"read {file.name} (CSV)", *notes),
+        zero_is_missing=False,
+    )
+
+
+def read_table(path: str | PathLike[str], *, unit: str | None = None) -> Take:
+    """All of a wide CSV in memory; see `open_table`."""
+    return open_table(path, unit=unit).whole()
+
+
+def write_table(take: Take, path: str | PathLike[str]) -> None:
+    """Write a take as a wide CSV in millimetres; missing markers are empty cells.
+
+    Raises
+    ------
+    SignfaceError
+        The file cannot be written.
+    """
+    import pandas as pd
+
+    columns = [f"{label}_{axis}" for label in take.labels for axis in AXES]
+    table = pd.DataFrame(take.positions.reshape(take.n_frames, -1), columns=columns)
+    table.insert(0, "time_s", take.time)
+    with whole_file(path) as temporary:
+        table.to_csv(temporary, index=False, float_format="%.6f")

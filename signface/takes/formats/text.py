@@ -1,0 +1,352 @@
+"""Text files of numbers, as the readers of TRC, TSV and CSV share them.
+
+- `read_text`: a file's text, whatever its encoding.
+- `TextFile`, `TextRows`: a file whose lines, or rows of numbers, are read in pieces.
+- `numbers`: cells to a table of floats, quickly, with the line named that does not fit.
+- `marker_rows`: rows of numbers as a recording.
+- `even_rate`: the rate from a column of times.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from signface.errors import SignfaceError
+from signface.takes.formats.units import SAMPLE, unit_factor
+from signface.takes.recording import TakeFile
+
+#: Bytes that are looked through at a time for the beginnings of lines, and rows whose times are read at a time.
+BLOCK, ROWS = 1 << 20, 16384
+
+#: What a blank line consists of: the signs up to the space.
+BLANK = "".join(map(chr, range(33)))
+
+
+def read_text(file: Path) -> str:
+    """The text of a file: UTF-8 (with or without a mark), UTF-16 with a mark, else Latin-1.
+
+    Raises
+    ------
+    SignfaceError
+        The file cannot be read, is empty, or is binary.
+    """
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise SignfaceError(f"cannot be read ({error.strerror})", file=file) from error
+    if not content.strip():
+        raise SignfaceError("the file is empty", file=file, hint="export it again")
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return content.decode("utf-16", errors="replace")
+    if b"\0" in content:
+        raise SignfaceError("is no text file", file=file, hint="export it again")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("latin-1")
+
+
+class TextFile:
+    """A text file whose lines are read in pieces.
+
+    Where each line begins is found in one pass; of the lines themselves only those asked for lie in memory. (A file in
+    UTF-16 is held whole, in UTF-8.) Blank lines do not count.
+
+    Attributes
+    ----------
+    file : Path
+    starts : (L + 1,) int64 array
+        The byte at which each line begins, and the end of the file.
+    line_numbers : (L,) int64 array
+        Numbers of the lines in the file, from 1, as editors count them.
+
+    Raises
+    ------
+    SignfaceError
+        The file cannot be read, is empty, or is binary.
+    """
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+        self._content: bytes | None = None
+        self._newline = b"\n"
+        with self._opened() as stream:
+            mark = stream.read(3)
+        if mark[:2] in (b"\xff\xfe", b"\xfe\xff"):
+            self._content, mark = read_text(file).encode("utf-8"), b""
+        self.starts, self.line_numbers = self._index(3 if mark == b"\xef\xbb\xbf" else 0)
+        if len(self.line_numbers) == 0:
+            raise SignfaceError("the file is empty", file=file, hint="export it again")
+
+    def __len__(self) -> int:
+        return len(self.line_numbers)
+
+    def _opened(self) -> BinaryIO:
+        if self._content is not None:
+            return io.BytesIO(self._content)
+        try:
+            return self.file.open("rb")
+        except OSError as error:
+            raise SignfaceError(f"cannot be read ({error.strerror})", file=self.file) from error
+
+    def _index(self, begin: int) -> tuple[np.ndarray, np.ndarray]:
+        """The attributes `starts` and `line_numbers`, from the bytes after the first `begin`."""
+        starts: list[np.ndarray] = []
+        numbers: list[np.ndarray] = []
+        start, ink, number, at = begin, 0, 1, begin
+        with self._opened() as stream:
+            stream.seek(begin)
+            while block := stream.read(BLOCK):
+                if b"\0" in block:
+                    raise SignfaceError("is no text file", file=self.file, hint="export it again")
+                if at == begin and b"\n" not in block and b"\r" in block:
+                    self._newline = b"\r"
+                signs = np.frombuffer(block, dtype=np.uint8)
+                ends = np.flatnonzero(signs == self._newline[0])
+                seen = np.concatenate(([0], np.cumsum(signs > 32, dtype=np.int64)))
+                begins = np.concatenate(([start], at + 1 + ends))  # of the line that was open, and of those after it
+                inked = np.diff(seen[np.concatenate(([0], ends, [len(block)]))])
+                inked[0] += ink
+                filled = inked[:-1] > 0
+                starts.append(begins[:-1][filled])
+                numbers.append(number + np.flatnonzero(filled))
+                start, ink, number, at = int(begins[-1]), int(inked[-1]), number + len(ends), at + len(block)
+        if ink:
+            starts.append(np.array([start]))
+            numbers.append(np.array([number]))
+        return np.concatenate([*starts, [at]]).astype(np.int64), np.concatenate([[], *numbers]).astype(np.int64)
+
+    def lines(self, first: int, last: int, step: int = 1) -> list[tuple[int, str]]:
+        """Number and text of every `step`-th line from `first` to before `last`.
+
+        UTF-8, else Latin-1.
+        """
+        wanted = range(first, min(last, len(self)), step)
+        if len(wanted) == 0:
+            return []
+        with self._opened() as stream:
+            if step == 1:
+                stream.seek(int(self.starts[first]))
+                content = stream.read(int(self.starts[wanted.stop] - self.starts[first]))
+            else:
+                parts = []
+                for line in wanted:
+                    stream.seek(int(self.starts[line]))
+                    parts.append(
+                        stream.read(int(self.starts[line + 1] - self.starts[line])).rstrip(b"\r\n") + self._newline
+                    )
+                content = b"".join(parts)
+        try:
+            text = content.decode("utf-8")
+        except UnicodeDecodeError:
+            text = content.decode("latin-1")
+        found = [line.rstrip("\r") for line in text.split(self._newline.decode()) if line.strip(BLANK)]
+        return list(zip(self.line_numbers[first : wanted.stop : step].tolist(), found, strict=True))
+
+
+class TextRows:
+    """The rows of numbers of a text file, from one of its lines on.
+
+    Parameters
+    ----------
+    text : TextFile
+    first : int
+        Index of the first row among the lines that are not blank.
+    columns, separator
+        As for `numbers`.
+
+    Raises
+    ------
+    SignfaceError
+        There is no row.
+    """
+
+    def __init__(self, text: TextFile, first: int, columns: int, separator: str) -> None:
+        self.text, self.first, self.columns, self.separator = text, first, columns, separator
+        if len(text) <= first:
+            raise SignfaceError("the file has no frames, only a header", file=text.file, hint="export it again")
+        self.decimal = _decimal(text.lines(first, first + 50), separator)
+
+    def __len__(self) -> int:
+        return len(self.text) - self.first
+
+    def values(self, begin: int, end: int, step: int = 1) -> np.ndarray:
+        """(K, columns) float64 array of every `step`-th row from `begin` to before `end`; see `numbers`."""
+        lines = self.text.lines(self.first + begin, self.first + end, step)
+        return numbers(lines, self.columns, self.separator, self.text.file, decimal=self.decimal)
+
+    def column(self, place: int) -> np.ndarray:
+        """One column of all rows.
+
+        Raises
+        ------
+        SignfaceError
+            A row has fewer cells than columns, or a cell of the column is no number.
+        """
+        cells: list[str] = []
+        for begin in range(self.first, len(self.text), ROWS):
+            lines = self.text.lines(begin, begin + ROWS)
+            _check_cells(lines, self.columns, self.separator, self.text.file)
+            cells.extend(line.split(self.separator, place + 1)[place].strip() for _, line in lines)
+        try:
+            return np.array([float(cell.replace(self.decimal, ".") or "nan") for cell in cells])
+        except ValueError as error:
+            raise _no_numbers(self.text.file) from error
+
+
+def _decimal(lines: Sequence[tuple[int, str]], separator: str) -> str:
+    """The decimal sign: a comma where lines have some that separate nothing, and no point."""
+    beginning = "".join(line for _, line in lines[:50])
+    return "," if separator != "," and "," in beginning and "." not in beginning else "."
+
+
+def _check_cells(lines: Sequence[tuple[int, str]], columns: int, separator: str, file: Path) -> None:
+    for number, line in lines:
+        if line.count(separator) < columns - 1:
+            cells = line.count(separator) + 1
+            raise SignfaceError(
+                f"line {number} has {cells} cells instead of {columns}", file=file, hint="the file may be cut short"
+            )
+
+
+def _no_numbers(file: Path) -> SignfaceError:
+    return SignfaceError("has cells that are not numbers", file=file, hint="look at the rows below its header")
+
+
+def numbers(
+    lines: Sequence[tuple[int, str]], columns: int, separator: str, file: Path, *, decimal: str | None = None
+) -> np.ndarray:
+    """Lines of cells to a (rows, columns) float64 array; an empty cell is NaN.
+
+    Cells beyond `columns` are left out (many exporters end their lines with a separator). Numbers have a decimal point,
+    or a decimal comma where the separator is another sign.
+
+    Parameters
+    ----------
+    lines : sequence of (int, str)
+        Number in the file, for errors, and text of each line below the header; none blank.
+    columns : int
+        How many cells a row has.
+    separator : str
+        `,`, `;` or tab.
+    file : Path
+        Named in errors.
+    decimal : str, optional
+        The decimal sign, where other lines than these have told it.
+
+    Raises
+    ------
+    SignfaceError
+        A row has fewer cells than columns (the last one is often cut short) or cells are words.
+    """
+    import pandas as pd
+
+    _check_cells(lines, columns, separator, file)
+    try:
+        table = pd.read_csv(
+            io.StringIO("\n".join(line for _, line in lines)),
+            sep=separator,
+            header=None,
+            usecols=range(columns),
+            names=range(max(line.count(separator) for _, line in lines) + 1),
+            decimal=_decimal(lines, separator) if decimal is None else decimal,
+            skipinitialspace=True,
+            quoting=3,
+            na_values=["NaN", "nan", "NULL", "null", "-", "#N/A"],
+            low_memory=False,
+            engine="c",
+        )
+        return table.to_numpy(dtype=np.float64)
+    except (ValueError, OverflowError, pd.errors.ParserError) as error:
+        raise _no_numbers(file) from error
+
+
+def even_rate(times: np.ndarray, file: Path) -> float:
+    """Frames per second (Hz) from times in seconds that rise evenly.
+
+    Times are often written with three digits, so that 1/120 s comes as 0.008, 0.017: the mean step over the whole
+    file is right where single steps are not. Where a whole number is within that rounding, it is the rate; 29.97 Hz
+    stays 29.97 Hz in any file long enough to tell.
+
+    Raises
+    ------
+    SignfaceError
+        Fewer than two times, or they do not rise evenly.
+    """
+    if len(times) < 2:
+        raise SignfaceError("has one frame, and a rate needs two", file=file, hint="export more of the recording")
+    steps = np.diff(times)
+    if not np.isfinite(times).all() or not (steps > 0).all():
+        raise SignfaceError("its times do not rise from row to row", file=file, hint="export it again")
+    step = float(times[-1] - times[0]) / (len(times) - 1)
+    rounding = 0.0005 if np.allclose(times * 1000, np.round(times * 1000), rtol=0, atol=1e-6) else 0.0000005
+    if np.abs(steps - step).max() > 0.25 * step + 2 * rounding:
+        raise SignfaceError(
+            "its times do not rise evenly", file=file, hint="export it at one rate, with empty cells for gaps"
+        )
+    rate = 1 / step
+    unsure = rate * 2 * rounding / float(times[-1] - times[0])
+    return float(round(rate)) if abs(rate - round(rate)) <= unsure and round(rate) > 0 else rate
+
+
+def marker_rows(
+    rows: TextRows,
+    places: np.ndarray,
+    labels: Sequence[str],
+    rate: float,
+    *,
+    units: str | None,
+    unit: str | None,
+    start: float,
+    history: tuple[str, ...],
+    zero_is_missing: bool = True,
+) -> TakeFile:
+    """Rows of numbers as a recording.
+
+    Parameters
+    ----------
+    rows : TextRows
+        A row for each frame.
+    places : (M, 3) int array
+        Columns of x, y and z of each marker.
+    labels, rate, start, history
+        As of `Take`; a note of the unit joins the history as its second entry.
+    units, unit : str, optional
+        As `found` and `given` of `signface.takes.formats.units.unit_factor`.
+    zero_is_missing : bool
+        Whether a marker at exactly (0, 0, 0) is a missing one.
+
+    Raises
+    ------
+    SignfaceError
+        A unit is not one of length.
+    """
+    file = rows.text.file
+
+    def raw(begin: int, end: int, step: int = 1) -> np.ndarray:
+        values = rows.values(begin, end, step)
+        positions = values[:, places.ravel()].reshape(len(values), len(places), 3)
+        if zero_is_missing:
+            positions[(positions == 0).all(axis=2)] = np.nan
+        return positions
+
+    sample = partial(raw, 0, len(rows), max(1, len(rows) // SAMPLE))
+    try:
+        factor, note = unit_factor(units, unit, markers=len(labels), sample=sample)
+    except SignfaceError as error:
+        raise SignfaceError(error.problem, file=file, hint=error.hint) from error
+    return TakeFile(
+        tuple(labels),
+        rate,
+        len(rows),
+        lambda begin, end, step: raw(begin, end, step) * factor,
+        start=start,
+        name=file.stem,
+        history=(history[0], note, *history[1:]),
+    )

@@ -1,0 +1,87 @@
+"""TRC, Motion Analysis' text format of trajectories, also written by OpenSim, Cortex and OptiTrack.
+
+Five lines of header: `PathFileType 4 (X/Y/Z) name`; the names of the fields (`DataRate`, `NumFrames`, `Units`, ...);
+their values; `Frame# Time` and the marker names, one for every three columns; `X1 Y1 Z1 ...`. Then a row a frame.
+"""
+
+from __future__ import annotations
+
+import math
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from signface.errors import SignfaceError
+from signface.takes.formats.text import TextFile, TextRows, even_rate, marker_rows
+from signface.takes.labels import clean_labels
+from signface.takes.recording import TakeFile
+from signface.takes.take import Take
+
+
+def _float(word: str) -> float:
+    try:
+        return float(word.replace(",", "."))
+    except ValueError:
+        return math.nan
+
+
+def open_trc(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
+    """Open a TRC file; its frames are read when they are asked for.
+
+    A marker is missing where its cells are empty, not finite, or all exactly zero. The unit is the header's
+    `Units`.
+
+    Raises
+    ------
+    SignfaceError
+        The header is not a TRC header, the first row is cut short or holds words, the rate is 0, or the unit is
+        unknown. Later rows are looked at when they are read.
+    """
+    file = Path(path)
+    text = TextFile(file)
+    # The third line may be blank cells, and the sixth is blank in many files: lines are told by their numbers.
+    lines = {number: line for number, line in text.lines(0, 5) if number <= 5}
+    if not lines.get(1, "").startswith("PathFileType"):
+        raise SignfaceError("is no TRC file", file=file, hint="its first line begins with PathFileType")
+    if 4 not in lines or text.line_numbers[-1] < 5:
+        raise SignfaceError("the TRC file is cut short in its header", file=file, hint="export it again")
+    fields = dict(zip(lines.get(2, "").split("\t"), lines.get(3, "").split("\t")))
+    fields = {name.strip().lower(): value.strip() for name, value in fields.items()}
+    heads = [cell.strip() for cell in lines[4].rstrip("\r\n").split("\t")]
+    if len(heads) < 3 or heads[0].lower() not in ("frame#", "frame") or heads[1].lower() != "time":
+        raise SignfaceError("the TRC file has no line of marker names", file=file, hint="export it again")
+    declared = fields.get("nummarkers", "")
+    markers = int(declared) if declared.isdigit() else sum(1 for name in heads[2:] if name)
+    names = (heads[2::3] + [""] * markers)[:markers]
+    if markers == 0:
+        raise SignfaceError("the TRC file has no markers", file=file, hint="export the trajectories with it")
+    if 2 + 3 * (markers - 1) > len(heads) - 1 and not any(names):
+        raise SignfaceError(f"the TRC file names none of its {markers} markers", file=file, hint="export it again")
+    if len(heads) < 2 + 3 * (markers - 1) + 1:
+        raise SignfaceError(f"the TRC file declares {markers} markers and names {sum(map(bool, names))}", file=file)
+    rows = TextRows(text, int(np.searchsorted(text.line_numbers, 6)), 2 + 3 * markers, "\t")
+    rate = _float(fields.get("datarate", ""))
+    if math.isnan(rate):
+        rate = even_rate(rows.column(1), file)
+    if not (math.isfinite(rate) and rate > 0):
+        raise SignfaceError("the TRC file has the rate 0", file=file, hint="set DataRate to its frames per second")
+    kept, labels, notes = clean_labels(names)
+    if not kept:
+        raise SignfaceError("none of the markers in the TRC file has a label", file=file, hint="label the markers")
+    start = float(rows.values(0, 1)[0, 1])
+    return marker_rows(
+        rows,
+        np.array(kept)[:, None] * 3 + np.arange(2, 5),
+        labels,
+        rate,
+        units=fields.get("units"),
+        unit=unit,
+        start=start if math.isfinite(start) else 0.0,
+        history=(f"read {file.name} (TRC)", *notes),
+    )
+
+
+def read_trc(path: str | PathLike[str], *, unit: str | None = None) -> Take:
+    """All of a TRC file in memory; see `open_trc`."""
+    return open_trc(path, unit=unit).whole()
