@@ -15,7 +15,7 @@ import pympi
 
 from signface.elan.export import write_eaf, write_into
 from signface.elan.reference import read_reference
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 
 COUNT = 5000
 

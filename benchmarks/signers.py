@@ -17,9 +17,9 @@ import numpy as np
 
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
-from signface.solve.creep import RATE_HZ, Creep
-from signface.solve.range_of_motion import Shown
-from signface.solve.solving import prepare_take
+from signface.solver.creep import RATE_HZ, Creep
+from signface.solver.range_of_motion import Shown
+from signface.solver.solving import prepare_take
 from signface.synth.corpus import Job, make_plan, make_signer, make_take
 from signface.synth.expressions import Spread
 from signface.synth.markers import head_motion, record

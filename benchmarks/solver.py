@@ -23,14 +23,14 @@ from signface.face.layout_files import read_layout
 from signface.face.model import FaceModel
 from signface.face.reading import read_face
 from signface.files import whole_file
-from signface.solve.bounds import LOWER, UPPER
-from signface.solve.calibration import calibrate
-from signface.solve.methods import METHODS, make_solver
-from signface.solve.range_of_motion import calibrate_shown
-from signface.solve.rivals.direct import ThinShellDeformation
-from signface.solve.solver import Solution
-from signface.solve.thin_shell import ThinShellSolver
-from signface.solve.uncertainty import deviations
+from signface.solver.base import Solution
+from signface.solver.bounds import LOWER, UPPER
+from signface.solver.calibration import calibrate
+from signface.solver.methods import METHODS, make_solver
+from signface.solver.range_of_motion import calibrate_shown
+from signface.solver.rivals.direct import ThinShellDeformation
+from signface.solver.thin_shell import ThinShellSolver
+from signface.solver.uncertainty import deviations
 
 #: Signers of these seeds: the constants of the solver were chosen on other ones (9000 and 7001).
 SEED, SIGNERS, TAKES = 8001, 4, 3

@@ -19,10 +19,10 @@ from scipy.optimize import minimize
 
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
-from signface.solve.adaptation import MorphologicalAdaptation
-from signface.solve.bounds import holding_energy, holding_slope
-from signface.solve.methods import METHODS, make_solver
-from signface.solve.thin_shell import ThinShellSolver
+from signface.solver.adaptation import MorphologicalAdaptation
+from signface.solver.bounds import holding_energy, holding_slope
+from signface.solver.methods import METHODS, make_solver
+from signface.solver.thin_shell import ThinShellSolver
 
 #: Methods that are timed on every sixtieth frame, and one on every six hundredth.
 SLOW, SLOWEST = ("nnls", "gaussian-process"), "bounded"

@@ -21,7 +21,7 @@ from pathlib import Path
 from signface.cli.progress import progress
 from signface.corpus.examples import solve_examples
 from signface.corpus.manifest import read_corpus
-from signface.evaluate.protocol import score_model
+from signface.evaluation.protocol import score_model
 from signface.files import whole_file
 from signface.label.labellers import NAMES, SEQUENCE_NAMES
 from signface.label.model import Card

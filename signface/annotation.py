@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from signface.face.layout import MarkerLayout
     from signface.face.model import FaceModel
     from signface.label.model import TrainedModel
-    from signface.label.variants import SignerLevel
-    from signface.segment.segments import Segments
+    from signface.segmentation.segments import Segments
+    from signface.signer import SignerLevel
     from signface.takes.recording import Recording
 
 
@@ -75,14 +75,14 @@ def annotate(
     neutral : float or "auto"
         Time in seconds of a frame with a neutral face.
     method : str
-        One of `signface.solve.methods.METHODS`.
+        One of `signface.solver.methods.METHODS`.
     alpha : float, optional
         Weight of the thin shell, 0 to 1; the method's own default when not given.
     level : SignerLevel, optional
-        What a model that normalises signers normalises by (`signface.label.variants.signer_level` of takes of the
+        What a model that normalises signers normalises by (`signface.signer.signer_level` of takes of the
         signer); the level of this take alone when not given.
     **options
-        More of `signface.solve.solving.solve_take`.
+        More of `signface.solver.solving.solve_take`.
 
     Raises
     ------
@@ -115,11 +115,11 @@ def describe(
 ) -> Descriptors:
     """Descriptors of a recording: solved from markers, or passed through when they came from a phone.
 
-    Parameters and errors are those of `annotate` and, for `options`, of `signface.solve.solving.solve_take`.
+    Parameters and errors are those of `annotate` and, for `options`, of `signface.solver.solving.solve_take`.
     """
     if isinstance(recording, Descriptors):
         return recording
-    from signface.solve.solving import solve_take
+    from signface.solver.solving import solve_take
 
     face, layout = _face_and_layout(recording, face, layout)
     return solve_take(recording, face, layout, neutral=neutral, method=method, alpha=alpha, **options)
@@ -136,7 +136,7 @@ def describe_pieces(
     if isinstance(recording, Descriptors):
         yield recording
         return
-    from signface.solve.solving import solve_pieces
+    from signface.solver.solving import solve_pieces
 
     face, layout = _face_and_layout(recording, face, layout)
     yield from solve_pieces(recording, face, layout, **options)

@@ -1,4 +1,4 @@
-"""The one error a user can mend.
+"""The one error a user can mend, and the one warning.
 
 Everything a user can put right (a missing file, a marker that is not in the layout, a neutral time outside the
 take) is raised as `SignfaceError`. The command line prints its message as one line and exits with status 2.
@@ -30,3 +30,17 @@ class SignfaceError(Exception):
         if hint:
             message = f"{message}. {hint[0].upper()}{hint[1:]}"
         super().__init__(" ".join(message.split()))
+
+    def at(self, file: str | PathLike[str]) -> SignfaceError:
+        """The same error, naming this file where it names none.
+
+        Examples
+        --------
+        >>> print(SignfaceError("is empty", hint="export it again").at("take.csv"))
+        take.csv: is empty. Export it again
+        """
+        return self if self.file is not None else type(self)(self.problem, file=file, hint=self.hint)
+
+
+class SignfaceWarning(UserWarning):
+    """Something a user should know of a result that was given all the same; the command line prints it as one line."""

@@ -101,7 +101,7 @@ def test_solve_then_segment_by_files(mini, tmp_path):
     take = str(mini.takes[0].path)
     assert main(["solve", take, "-o", str(tmp_path / "w.csv")]) == 0
     assert main(["segment", str(tmp_path / "w.csv"), "-o", str(tmp_path / "s.csv")]) == 0
-    from signface.segment.segments import read_segments
+    from signface.segmentation.segments import read_segments
 
     segments = read_segments(tmp_path / "s.csv")
     assert set(segments.table["kind"]) == {"stable", "transition"}

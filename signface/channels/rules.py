@@ -24,7 +24,7 @@ from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.files import shipped
 from signface.frames import bridge, hysteresis, long_enough
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 
 #: Keys that a channel's table holds besides its values.
 CHANNEL_KEYS = {"description", "together", "measured_only"}

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from signface.face.layout import MarkerLayout
     from signface.face.model import FaceModel
     from signface.label.model import TrainedModel
-    from signface.label.variants import SignerLevel
+    from signface.signer import SignerLevel
 
 EXAMPLE = """  signface annotate take.c3d -o take.eaf
   signface annotate recordings/*.c3d -o annotated/ --signer S1
@@ -86,7 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
         known: dict[Path, Descriptors] = {}
         level = None
         if len(takes) > 1 and model.result().card.normalise == "signer":
-            from signface.label.variants import signer_level
+            from signface.signer import signer_level
 
             known = _described(takes, arguments, face, layout)
             level = signer_level(list(known.values())) if known else None

@@ -37,8 +37,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     from signface.descriptors import Descriptors
     from signface.face.layout_files import choose_layout
-    from signface.solve.range_of_motion import calibrate_shown, read_shown, write_signer
-    from signface.solve.solving import prepare_take
+    from signface.solver.range_of_motion import calibrate_shown, read_shown, write_signer
+    from signface.solver.solving import prepare_take
     from signface.takes.reading import open_recording
 
     if arguments.output.suffix.lower() != ".csv":

@@ -163,7 +163,7 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
     from signface.corpus.examples import solve_examples
     from signface.corpus.manifest import read_corpus
     from signface.elan.reference import read_corrections
-    from signface.evaluate.corrections import changes, summarise_changes
+    from signface.evaluation.corrections import changes, summarise_changes
 
     corpus = read_corpus(arguments.corpus)
     annotated = [(entry.annotation, entry.signer) for entry in corpus if entry.annotation is not None]

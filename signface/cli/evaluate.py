@@ -16,7 +16,7 @@ from signface.label.labellers import NAMES, SEQUENCE_NAMES
 
 if TYPE_CHECKING:
     from signface.learn.examples import Example
-    from signface.segment.segments import Segments
+    from signface.segmentation.segments import Segments
 
 EXAMPLE = """  signface evaluate corpora/feel -o reports/feel
   signface evaluate corpora/feel -o reports/feel --train-kinds IE,SE,EU --protocol across --classifiers net-hsmm"""
@@ -141,9 +141,9 @@ def measure(
 
     `classifiers` holds the first protocol; a second one stands under `also`, by its name.
     """
-    from signface.evaluate.details import details
-    from signface.evaluate.protocol import evaluate, folds_of
-    from signface.segment.segmentation import segment
+    from signface.evaluation.details import details
+    from signface.evaluation.protocol import evaluate, folds_of
+    from signface.segmentation.cutting import segment
 
     segments = {e.take: segment(e.descriptors) for e in examples}
     metrics: dict = {}

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 
 from signface.errors import SignfaceError
-from signface.solve.compiling import on_compiling
+from signface.solver.compiling import on_compiling
 
 #: command: what it does, in a line. The module has the same name.
 COMMANDS = {

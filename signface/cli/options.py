@@ -121,7 +121,7 @@ def writing_options(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def solve_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """What `add_solve_arguments` asked for, as keywords of `signface.solve.solving.solve_take`."""
+    """What `add_solve_arguments` asked for, as keywords of `signface.solver.solving.solve_take`."""
     return {
         "neutral": arguments.neutral,
         "method": arguments.method,

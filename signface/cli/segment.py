@@ -23,8 +23,8 @@ def run(arguments: argparse.Namespace) -> None:
     """Cut the recording and write its segments."""
     from signface.annotation import describe
     from signface.descriptors import Descriptors
-    from signface.segment.segmentation import segment
-    from signface.segment.segments import write_segments
+    from signface.segmentation.cutting import segment
+    from signface.segmentation.segments import write_segments
     from signface.takes.reading import open_recording
 
     if arguments.output.suffix.lower() != ".csv":

@@ -25,7 +25,7 @@ from signface.errors import SignfaceError
 from signface.files import shipped
 
 #: The modules between a recording and its descriptors.
-SOLVING_CODE = ("takes", "face", "solve", "frames.py", "descriptors.py", "annotation.py", "corpus/describing.py")
+SOLVING_CODE = ("takes", "face", "solver", "frames.py", "descriptors.py", "annotation.py", "corpus/describing.py")
 
 #: Recordings that hold weights: there is nothing to solve, and neither face nor layout matter.
 WEIGHTS_FORMATS = ("weights", "livelink")

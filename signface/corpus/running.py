@@ -54,7 +54,7 @@ LOCK = ".lock"
 DATE = "2000-01-01T00:00:00+00:00"
 
 #: The modules between descriptors and annotation files.
-ANNOTATING_CODE = ("frames.py", "segment", "label", "sequence", "channels", "elan", "annotation.py")
+ANNOTATING_CODE = ("frames.py", "segmentation", "label", "sequence", "channels", "elan", "annotation.py")
 
 #: What can become of a take. `corrected`: an annotator worked in its `.eaf`, which stays as it is.
 DONE, BEFORE, CORRECTED, FAILED = "done", "before", "corrected", "failed"

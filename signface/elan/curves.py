@@ -24,8 +24,8 @@ from signface.descriptors import Descriptors
 from signface.elan.document import iso_date, link_urls, write_document
 from signface.errors import SignfaceError
 from signface.files import whole_file
-from signface.segment.energy import energies
-from signface.segment.segments import Segments
+from signface.segmentation.energy import energies
+from signface.segmentation.segments import Segments
 
 #: Rows per second of the csv: a whole number of milliseconds apart.
 CURVES_RATE = 100

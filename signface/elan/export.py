@@ -42,7 +42,7 @@ from signface.elan.tiers import Tier, affect_tier, xml_text
 from signface.elan.upgrade import upgrade
 from signface.elan.vocabularies import AFFECT, Vocabulary
 from signface.errors import SignfaceError
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 
 
 def write_eaf(

@@ -21,7 +21,7 @@ from signface.elan.export import prepare_eaf, prepare_into
 from signface.elan.mapping import Mapping
 from signface.elan.tiers import doubtful_tier
 from signface.elan.vocabularies import AFFECT
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 
 TSCONF = "_tsconf.xml"
 

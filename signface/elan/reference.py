@@ -22,7 +22,7 @@ from signface.elan.tiers import clean_name, tier_name
 from signface.elan.vocabularies import AFFECT, INTENSITY
 from signface.errors import SignfaceError
 from signface.label.vocabulary import AFFECTS
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 
 
 def read_reference(

@@ -16,7 +16,7 @@ import pandas as pd
 
 from signface.elan.vocabularies import AFFECT, INTENSITY, Vocabulary
 from signface.errors import SignfaceError
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import pandas as pd
 from signface.descriptors import Descriptors
 from signface.label.spans import segment_means
 from signface.label.vocabulary import AFFECTS
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 
 #: The intensities there are.
 INTENSITIES = (1, 2, 3)

@@ -17,10 +17,10 @@ from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.label.model import TrainedModel
 from signface.label.spans import frames_within, segment_means
-from signface.label.variants import SignerLevel
 from signface.label.vocabulary import join
-from signface.segment.segmentation import segment
-from signface.segment.segments import Segments
+from signface.segmentation.cutting import segment
+from signface.segmentation.segments import Segments
+from signface.signer import SignerLevel
 
 #: Frames per second that the confidence of a segment is averaged over.
 CONFIDENCE_RATE = 25.0
@@ -125,7 +125,7 @@ def label_segments(
     descriptors : Descriptors
         The take.
     segments : Segments
-        Its segments, from `signface.segment.segmentation.segment`.
+        Its segments, from `signface.segmentation.cutting.segment`.
     model : TrainedModel
     level : SignerLevel, optional
         As in `TrainedModel.seen`.
@@ -156,7 +156,7 @@ def label_segments(
 def find_segments(descriptors: Descriptors, model: TrainedModel, *, level: SignerLevel | None = None) -> Segments:
     """The labelled segments of a take.
 
-    A sequence model finds them itself; for the others the take is cut by `signface.segment.segmentation.segment` and
+    A sequence model finds them itself; for the others the take is cut by `signface.segmentation.cutting.segment` and
     labelled by `label_segments`. The columns are the same, and neighbours have unequal labels.
 
     Raises

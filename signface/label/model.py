@@ -12,7 +12,8 @@ from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.label.calibration import calibrated
 from signface.label.labellers import SEQUENCE_NAMES
-from signface.label.variants import DescriptorVariant, SignerLevel
+from signface.label.variants import DescriptorVariant
+from signface.signer import SignerLevel
 
 if TYPE_CHECKING:
     from sklearn.base import ClassifierMixin

@@ -2,13 +2,12 @@
 
 - `FEATURES`, `NORMALISATIONS`: what there is to choose from.
 - `DescriptorVariant`: a choice of them, as a transformer of takes.
-- `SignerLevel`, `signer_level`: where a signer's face rests and how far it moves, without any label.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from sklearn.base import BaseEstimator, TransformerMixin
@@ -16,7 +15,8 @@ from sklearn.base import BaseEstimator, TransformerMixin
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.frames import Means
-from signface.segment.energy import bridged
+from signface.segmentation.energy import bridged
+from signface.signer import SignerLevel, signer_level
 
 #: name: what it is.
 FEATURES = {
@@ -34,57 +34,12 @@ NORMALISATIONS = {
 #: Width of the windows, seconds.
 WINDOW_S = 1.0
 
-#: Width of the parabola whose slope is the derivative, seconds (as `signface.segment.energy.energies`).
+#: Width of the parabola whose slope is the derivative, seconds (as `signface.segmentation.energy.energies`).
 SLOPE_S = 0.23
 
 #: Added to every spread: a base that hardly moves must not be blown up to the size of one that does (weights are 0 at
 #: rest and 1 fully active).
 LEAST_SPREAD = 0.02
-
-
-@dataclass(frozen=True)
-class SignerLevel:
-    """How a signer's weights lie, whatever is expressed.
-
-    Parameters
-    ----------
-    names : tuple of str
-        The bases.
-    mean, spread : (N,) arrays
-        Mean and standard deviation of the weight of each base over all frames.
-    """
-
-    names: tuple[str, ...]
-    mean: np.ndarray
-    spread: np.ndarray
-
-
-def signer_level(takes: Sequence[Descriptors]) -> SignerLevel:
-    """Mean and spread of the weights of a signer over some takes; every frame counts the same time.
-
-    No label is looked at, so that takes that are to be labelled can be used.
-
-    Raises
-    ------
-    SignfaceError
-        There is no take, none has a frame with weights, or they have other bases.
-    """
-    if not takes:
-        raise SignfaceError("there is no take of the signer to normalise by")
-    names = takes[0].names
-    seconds, total, squares = 0.0, np.zeros(len(names)), np.zeros(len(names))
-    for take in takes:
-        if set(take.names) != set(names):
-            raise SignfaceError(f"{take.name} was solved with other bases than {takes[0].name}")
-        weights = take.weights[:, [take.names.index(name) for name in names]]
-        weights = weights[np.isfinite(weights).all(axis=1)]
-        seconds += len(weights) / take.rate
-        total += weights.sum(axis=0) / take.rate
-        squares += (weights**2).sum(axis=0) / take.rate
-    if not seconds:
-        raise SignfaceError(f"{takes[0].name}: no frame has weights", hint="look at the markers: signface take info")
-    mean = total / seconds
-    return SignerLevel(names, mean, np.sqrt((squares / seconds - mean**2).clip(0)))
 
 
 class DescriptorVariant(TransformerMixin, BaseEstimator):

@@ -17,9 +17,10 @@ import pandas as pd
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
-from signface.label.variants import DescriptorVariant, SignerLevel, signer_level
+from signface.label.variants import DescriptorVariant
 from signface.label.vocabulary import AFFECTS
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
+from signface.signer import SignerLevel, signer_level
 
 #: Frames per second kept for training: a held face hardly changes in a tenth of a second.
 TRAINING_RATE = 10.0

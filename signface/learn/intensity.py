@@ -14,7 +14,7 @@ import pandas as pd
 from signface.label.intensity import EXPRESSED, IntensityClassifier
 from signface.learn.examples import Example, common_bases
 from signface.learn.ordinal import OrdinalClassifier
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 
 if TYPE_CHECKING:
     from sklearn.linear_model import LogisticRegression

@@ -18,7 +18,7 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from signface.segment.segments import value_at
+from signface.segmentation.segments import value_at
 
 #: Tolerances at which boundaries are compared (s).
 TOLERANCES_S = (0.05, 0.10, 0.20)

@@ -19,9 +19,9 @@ import numpy as np
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
-from signface.solve.adaptation import MorphologicalAdaptation
-from signface.solve.methods import make_solver
-from signface.solve.rivals.gaussian_process import GaussianProcess, SparseOnlineGaussianProcess
+from signface.solver.adaptation import MorphologicalAdaptation
+from signface.solver.methods import make_solver
+from signface.solver.rivals.gaussian_process import GaussianProcess, SparseOnlineGaussianProcess
 from signface.synth.actors import Actor, Virtual
 
 #: The mappings, and how they are called in reports.

@@ -25,7 +25,7 @@ from scipy.sparse.linalg import splu
 from signface.face.model import FaceModel
 from signface.face.operators import stiffness_and_mass, thin_shell_matrices
 from signface.placement.sites import Board, Sites
-from signface.solve.thin_shell import ALPHA, TOLERANCE
+from signface.solver.thin_shell import ALPHA, TOLERANCE
 
 #: Noise of a marker's coordinate that selection reckons with: jitter (mm), and how far aside it may be glued (mm).
 JITTER_MM, ASIDE_MM = 0.2, 2.0

@@ -11,7 +11,7 @@ from signface.face.model import FaceModel
 from signface.label.vocabulary import AFFECTS
 from signface.report.colours import colour_of
 from signface.report.timeline import draw_timeline_on
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

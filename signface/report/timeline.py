@@ -16,7 +16,7 @@ import numpy as np
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.report.colours import colour_of, ink_on
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -91,7 +91,7 @@ def draw_rows_on(
     marks : mapping of str to (K,) array, optional
         Row to times of boundaries that are pointed out on it (seconds).
     """
-    from signface.segment.energy import energies
+    from signface.segmentation.energy import energies
 
     curves = energies(descriptors)
     step = 1 if rate is None else max(1, round((len(curves.time) - 1) / (curves.time[-1] - curves.time[0]) / rate))

@@ -13,7 +13,7 @@ import numpy as np
 
 from signface.descriptors import Descriptors
 from signface.frames import Means
-from signface.segment.energy import bridged
+from signface.segmentation.energy import bridged
 
 #: Region: how the names of its bases begin (ARKit's names). Blinks and the mouth that talks stand apart from the rest.
 REGIONS = {

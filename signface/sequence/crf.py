@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from signface.descriptors import Descriptors
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 from signface.sequence.take_labeller import HALVES, TakeLabeller, shares, standardised
 
 

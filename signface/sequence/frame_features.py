@@ -14,8 +14,8 @@ import numpy as np
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.frames import Means
-from signface.segment.energy import bridged
-from signface.segment.segments import Segments, value_at
+from signface.segmentation.energy import bridged
+from signface.segmentation.segments import Segments, value_at
 
 #: What stands for every transition among the states.
 TRANSITION = "transition"

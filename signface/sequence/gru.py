@@ -17,7 +17,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.special import expit, ndtr, softmax
 
 from signface.descriptors import Descriptors
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 from signface.sequence.semi_markov import SegmentModel
 from signface.sequence.take_labeller import HALVES, TakeLabeller, log_odds, shares, standardised
 

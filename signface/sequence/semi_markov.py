@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 
 #: Longest durations that are counted (s). A longer expression pays by the frame; a longer transition does not occur.
 LONGEST_STABLE_S = 8.0

@@ -18,7 +18,7 @@ from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.frames import runs
 from signface.label.vocabulary import join
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 from signface.sequence.boundary_features import boundary_features
 from signface.sequence.frame_features import TRANSITION, FrameFeatures, frame_states
 

@@ -28,7 +28,7 @@ from signface.face.layout_files import read_layout
 from signface.face.model import FaceModel
 from signface.face.reading import read_face, read_identities
 from signface.files import whole_file
-from signface.segment.segments import Segments, write_segments
+from signface.segmentation.segments import Segments, write_segments
 from signface.synth.expressions import AFFECTS, Habits, Spread, draw_habits
 from signface.synth.heads import Head, draw_head
 from signface.synth.markers import Glued, glue_markers, head_motion, record

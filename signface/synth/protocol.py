@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 from signface.synth.expressions import AFFECTS, NEUTRAL, Habits
 
 KINDS = ("IE", "SE", "EU")

@@ -13,7 +13,7 @@ from signface.channels.head import head_angles, swings
 from signface.channels.rules import bridge, find_channels, find_intensities, hysteresis, long_enough, read_channels
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 
 BASES = (
     *("browInnerUp", "browOuterUpLeft", "browOuterUpRight", "browDownLeft", "browDownRight", "eyeBlinkLeft"),

@@ -18,7 +18,7 @@ from signface.descriptors import write_weights
 from signface.elan.export import write_eaf
 from signface.label.labellers import NAMES
 from signface.label.persistence import load_model, read_card
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 from tests.fixtures.hand_made import corpus
 
 

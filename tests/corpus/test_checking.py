@@ -15,7 +15,7 @@ from signface.corpus.origin import make_recipe
 from signface.descriptors import write_weights
 from signface.elan.export import write_eaf
 from signface.errors import SignfaceError
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 from tests.fixtures.hand_made import example
 
 

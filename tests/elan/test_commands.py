@@ -21,10 +21,10 @@ from signface.elan.recogniser import extensions_folder, read_parameters, write_e
 from signface.elan.reference import read_corrections, read_reference
 from signface.elan.tiers import affect_tier
 from signface.errors import SignfaceError
-from signface.evaluate.corrections import changes, summarise_changes
+from signface.evaluation.corrections import changes, summarise_changes
 from signface.label.persistence import load_model, save_model
 from signface.learn.training import Example, train_model
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 from tests.elan.test_templates import LAB, MAPPING
 from tests.fixtures.elan_files import assert_valid, labelled
 

@@ -19,7 +19,7 @@ from signface.elan.export import write_eaf
 from signface.elan.reference import read_reference
 from signface.elan.tiers import milliseconds
 from signface.errors import SignfaceError
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 from tests.fixtures.elan_files import SCHEMA, assert_valid, labelled, needs_schema, read_back
 
 

@@ -21,7 +21,7 @@ from signface.corpus.manifest import TakeEntry, write_takes
 from signface.descriptors import write_weights
 from signface.elan.export import write_eaf
 from signface.elan.reference import read_reference
-from signface.evaluate.protocol import evaluate, folds_of
+from signface.evaluation.protocol import evaluate, folds_of
 from signface.label.intensity import INTENSITIES
 from signface.label.persistence import load_model, save_model
 from signface.label.spans import segment_means
@@ -29,7 +29,7 @@ from signface.learn.examples import Example
 from signface.learn.intensity import train_intensity
 from signface.learn.ordinal import OrdinalClassifier, ordinal_metrics
 from signface.learn.training import train_model
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 from tests.fixtures.hand_made import BASES, FACES, moving_face
 
 SHOWN = ("J", "A", "Su")

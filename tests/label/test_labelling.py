@@ -16,8 +16,8 @@ from signface.label.labelling import label_segments
 from signface.label.spans import segment_means
 from signface.label.vocabulary import AFFECTS, is_transition
 from signface.learn.training import train_model
-from signface.segment.segmentation import segment
-from signface.segment.segments import Segments
+from signface.segmentation.cutting import segment
+from signface.segmentation.segments import Segments
 from tests.fixtures.hand_made import BASES, FACES, corpus, example, moving_face
 
 

@@ -109,7 +109,7 @@ def test_help_and_solving_import_no_learning():
     code = """
 import sys
 from signface.cli.main import main
-import signface.annotation, signface.solve.solving, signface.takes.formats.c3d, signface.face.layout_files
+import signface.annotation, signface.solver.solving, signface.takes.formats.c3d, signface.face.layout_files
 print([name for name in ("pandas", "sklearn", "scipy.stats", "skops", "torch") if name in sys.modules])
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

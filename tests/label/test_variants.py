@@ -12,11 +12,12 @@ from signface.cli.main import main
 from signface.descriptors import Descriptors, read_weights, write_weights
 from signface.elan.reference import read_reference
 from signface.errors import SignfaceError
-from signface.evaluate.protocol import evaluate, folds_of
+from signface.evaluation.protocol import evaluate, folds_of
 from signface.label.labelling import find_segments, label_spans
 from signface.label.persistence import load_model, save_model
-from signface.label.variants import DescriptorVariant, signer_level
+from signface.label.variants import DescriptorVariant
 from signface.learn.training import train_model
+from signface.signer import signer_level
 from tests.fixtures.hand_made import BASES, corpus, example
 
 

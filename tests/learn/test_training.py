@@ -16,7 +16,7 @@ from signface.label.labellers import NAMES, make_labeller
 from signface.label.labelling import label_spans
 from signface.learn.examples import Example, training_frames
 from signface.learn.training import train_model
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 from tests.fixtures.hand_made import BASES, corpus, example
 
 

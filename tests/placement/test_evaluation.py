@@ -15,7 +15,7 @@ from signface.placement.evaluation import error_map, evaluate_layout, skin_metri
 from signface.placement.findings import against, flattening
 from signface.placement.layout_study import Plan, load_cell, save_cell
 from signface.render.layout_sheet import distances, numbering
-from signface.solve.rivals.gaussian_process import GaussianProcess, SparseOnlineGaussianProcess
+from signface.solver.rivals.gaussian_process import GaussianProcess, SparseOnlineGaussianProcess
 from signface.synth.actors import Virtual, draw_actors
 
 

@@ -20,7 +20,7 @@ from signface.report.evaluation.evaluated import Evaluated
 from signface.report.evaluation.importance import draw_importance, skin_values
 from signface.report.evaluation.report import draw_all, write_report
 from signface.report.evaluation.words import headline, limits, training_words
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 from tests.fixtures.hand_made import corpus
 
 SECTIONS = (

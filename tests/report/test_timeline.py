@@ -9,7 +9,7 @@ from signface.errors import SignfaceError
 from signface.label.vocabulary import AFFECTS
 from signface.report.colours import colour_of, ink_on
 from signface.report.timeline import draw_timeline, save_figure
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import pytest
 
 from signface.descriptors import Descriptors
 from signface.report.evaluation.worst_takes import agreeing_stretches, judge_take
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 
 
 def segments(*rows: tuple[float, float, str], confidence: float = 0.9) -> Segments:

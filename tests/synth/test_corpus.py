@@ -11,7 +11,7 @@ from signface.corpus.manifest import read_corpus
 from signface.descriptors import read_weights
 from signface.elan.reference import read_reference
 from signface.errors import SignfaceError
-from signface.segment.segments import read_segments
+from signface.segmentation.segments import read_segments
 from signface.synth.corpus import (
     MINI_SEED,
     RATE,

@@ -17,13 +17,13 @@ from zlib import crc32
 import numpy as np
 import pandas as pd
 
-from signface.evaluate.details import favourite
+from signface.evaluation.details import favourite
 from signface.face.model import FaceModel
 from signface.learn.examples import Example
 from signface.report.evaluation.tables import by_protocol
 from signface.report.evaluation.worst_takes import TakeVerdict, judge_take
 from signface.report.figure_files import svg_element
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

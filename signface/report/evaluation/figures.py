@@ -19,7 +19,7 @@ from signface.descriptors import Descriptors
 from signface.report.evaluation.tables import PROTOCOL_TITLES, SECTIONS
 from signface.report.figure_files import COLOURS, MARKS, styled
 from signface.report.timeline import draw_rows_on
-from signface.segment.segments import Segments
+from signface.segmentation.segments import Segments
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -191,7 +191,7 @@ def draw_learning_curve(table: pd.DataFrame) -> Figure:
     Parameters
     ----------
     table : DataFrame
-        `protocol`, and the columns of `signface.evaluate.learning_curve.learning_curve`.
+        `protocol`, and the columns of `signface.evaluation.learning_curve.learning_curve`.
     """
     with styled():
         protocols = list(dict.fromkeys(table["protocol"]))

@@ -32,7 +32,7 @@ def skin_values(face: FaceModel, table: pd.DataFrame) -> np.ndarray:
     face : FaceModel
         Has all bases of the table.
     table : DataFrame
-        Of `signface.evaluate.importance.permutation_importance`. Losses below zero are chance and count as none.
+        Of `signface.evaluation.importance.permutation_importance`. Losses below zero are chance and count as none.
     """
     values = np.zeros(len(face.mesh.vertices))
     for bases, lost in zip(table["bases"], table["accuracy_lost"], strict=True):

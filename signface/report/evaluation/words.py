@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from signface.evaluate.details import ENERGIES, favourite
+from signface.evaluation.details import ENERGIES, favourite
 from signface.label.labellers import NAMES, SEQUENCE_NAMES
 from signface.label.vocabulary import AFFECTS
 from signface.report.evaluation.tables import by_protocol

@@ -16,7 +16,7 @@ from signface.descriptors import Descriptors
 from signface.frames import runs
 from signface.label.vocabulary import AFFECTS
 from signface.metrics.segmentation import match_boundaries
-from signface.segment.segments import Segments, value_at
+from signface.segmentation.segments import Segments, value_at
 
 #: A boundary further than this from every other is missed (or one too many): where people would not take it for the
 #: same (s).

@@ -48,7 +48,7 @@ def parse_method(name: str) -> Method:
     SignfaceError
         No method has this name.
     """
-    from signface.solve.methods import METHODS
+    from signface.solver.methods import METHODS
 
     match = re.fullmatch(r"LSTS(\d{2,3})", name)
     if match and int(match[1]) <= 100:
@@ -76,10 +76,10 @@ def solve_methods(
     Raises
     ------
     SignfaceError
-        As `signface.solve.solving.solve_take`.
+        As `signface.solver.solving.solve_take`.
     """
-    from signface.solve.methods import make_solver
-    from signface.solve.solving import prepare_take
+    from signface.solver.methods import make_solver
+    from signface.solver.solving import prepare_take
 
     prepared = prepare_take(take, face, layout, neutral=neutral)
     found = {}

@@ -1,0 +1,73 @@
+"""What a laboratory decided once: a TOML with the tables `[solve]`, `[train]` and `[eaf]`.
+
+- `read_settings`: the file, as a `Laboratory`.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from signface.elan.options import EafOptions
+from signface.errors import SignfaceError
+from signface.learn.settings import TrainingSettings
+from signface.settings import Settings
+from signface.solver.settings import SolveSettings
+
+
+@dataclass(frozen=True)
+class Laboratory:
+    """What a laboratory decided once, from its TOML."""
+
+    solve: SolveSettings = field(default_factory=SolveSettings)
+    train: TrainingSettings = field(default_factory=TrainingSettings)
+    eaf: EafOptions = field(default_factory=EafOptions)
+
+
+def read_settings(path: str | PathLike[str]) -> Laboratory:
+    """A laboratory's settings from a TOML with the tables `[solve]`, `[train]` and `[eaf]`, none of them required.
+
+    Raises
+    ------
+    SignfaceError
+        There is no such file, it is no TOML, or it names something that there is not.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> file = Path(mkdtemp()) / "lab.toml"
+    >>> _ = file.write_text("[solve]\\nalpha = 0.3\\n")
+    >>> read_settings(file).solve.alpha
+    0.3
+    """
+    file = Path(path)
+    try:
+        content = tomllib.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise SignfaceError("no such file", file=file) from error
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise SignfaceError(f"cannot be read as TOML ({error})", file=file) from error
+    tables: dict[str, type[Settings]] = {"solve": SolveSettings, "train": TrainingSettings, "eaf": EafOptions}
+    for name, table in content.items():
+        if name not in tables or not isinstance(table, dict):
+            raise SignfaceError(f"has no table [{name}]", file=file, hint=f"its tables are {', '.join(tables)}")
+    made = {
+        name: kind.from_dict(_with_paths(kind, content.get(name, {}), file.parent), file=file)
+        for name, kind in tables.items()
+    }
+    return Laboratory(**made)  # type: ignore[arg-type]
+
+
+def _with_paths(kind: type[Settings], values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """The values, with paths that exist beside the TOML made its folder's."""
+    found = dict(values)
+    for item in fields(kind):  # type: ignore[arg-type]
+        value = found.get(item.name)
+        if item.metadata.get("path") and isinstance(value, str) and (folder / value).exists():
+            found[item.name] = str(folder / value)
+    return found

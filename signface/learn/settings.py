@@ -1,0 +1,71 @@
+"""How a classifier is trained, as one object that every door knows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from signface.errors import SignfaceError
+from signface.label.labellers import NAMES, SEQUENCE_NAMES
+from signface.settings import Settings, option
+
+
+@dataclass(frozen=True)
+class TrainingSettings(Settings):
+    """What is trained, on what of the takes, and how (thesis 4.4.3); validated when it is made.
+
+    The fields say in their metadata what they decide.
+
+    Raises
+    ------
+    SignfaceError
+        A value is not of its kind, or there is no such classifier.
+
+    See Also
+    --------
+    signface.learn.training.train_model : which is told of it.
+
+    Examples
+    --------
+    >>> TrainingSettings(classifier="knn3", normalise="signer").chosen
+    {'classifier': 'knn3', 'normalise': 'signer'}
+    """
+
+    TABLE = "train"
+
+    classifier: str = option("forest", help="what to train", choices=(*NAMES, *SEQUENCE_NAMES))
+    features: tuple[str, ...] = option(
+        ("weights",),
+        help="what classifiers of segments see: weights, derivatives, windows, or several of them",
+        kind=tuple,
+        metavar="NAMES",
+    )
+    normalise: str = option(
+        "none",
+        help="signer: weights less the signer's mean, over their spread, from all takes of the signer at hand",
+        choices=("none", "signer"),
+    )
+    aggregate: str = option(
+        "mean",
+        help="label a segment by its mean descriptor (as in the thesis) or by all of its frames",
+        choices=("mean", "frames"),
+    )
+    balanced: bool = option(False, help="let every label weigh the same in training", kind=bool)
+    search: bool = option(False, help="look for the best parameters, by folds of the training takes", kind=bool)
+    calibrate: bool = option(
+        True,
+        help="train on parts of the takes too, to score the rest and to calibrate confidences",
+        kind=bool,
+    )
+    folds: int = option(5, help="how many parts, at most as many as there are takes or signers", kind=int)
+    rate: float = option(10.0, help="frames of a second of stable segment that are trained on", kind=float)
+    parameters: Mapping[str, Any] = option(
+        help="parameters of the classifier to set", kind=Mapping, default_factory=dict
+    )
+    seed: int = option(0, help="two trainings with one seed give the same model", kind=int)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.folds < 2 or not 0 < self.rate < float("inf"):
+            raise SignfaceError(f"folds are two or more, and the rate is positive: {self.folds}, {self.rate:g}")

@@ -1,0 +1,263 @@
+"""Who signs: a name, bases of their own, and where their face rests.
+
+- `Signer`: all that is known of one, in one object that every door takes; `Signer.read` and `Signer.save`.
+- `SignerBases`: bases as one signer shows them, at named markers, from `signface calibrate`.
+- `SignerLevel`, `signer_level`: where a signer's weights lie and how far they move, without any label.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from signface.errors import SignfaceError
+from signface.files import whole_file
+
+if TYPE_CHECKING:
+    from signface.descriptors import Descriptors
+    from signface.face.layout import MarkerLayout
+    from signface.face.model import FaceModel
+
+
+@dataclass(frozen=True, eq=False)
+class SignerBases:
+    """Bases as one signer shows them: displacements of markers, in the face's unit.
+
+    Parameters
+    ----------
+    bases, markers : (K,) tuples of str
+    displacements : (K, 3) float64 array
+        Of that marker at weight 1 of that base.
+    source : str
+        The file they were read from, for messages and histories.
+    """
+
+    bases: tuple[str, ...]
+    markers: tuple[str, ...]
+    displacements: np.ndarray
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        places = np.array(self.displacements, dtype=np.float64)
+        if places.shape != (len(self.bases), 3) or len(self.bases) != len(self.markers):
+            raise SignfaceError(f"{len(self.bases)} bases of a signer do not match displacements of {places.shape}")
+        if not np.isfinite(places).all():
+            raise SignfaceError("has cells that are not numbers", file=self.source or None)
+        places.setflags(write=False)
+        object.__setattr__(self, "displacements", places)
+
+    @classmethod
+    def read(cls, path: str | PathLike[str]) -> SignerBases:
+        """The bases in a csv with the columns `base, marker, x, y, z`.
+
+        Raises
+        ------
+        SignfaceError
+            There is no such file, or it is none that `signface calibrate` writes.
+        """
+        import pandas as pd
+
+        file = Path(path)
+        try:
+            table = pd.read_csv(file, dtype={"base": str, "marker": str})
+            places = table[["x", "y", "z"]].to_numpy(dtype=np.float64)
+            return cls(tuple(table["base"]), tuple(table["marker"]), places, source=str(file))
+        except FileNotFoundError:
+            raise SignfaceError("no such file", file=file) from None
+        except (OSError, ValueError, KeyError) as error:
+            raise SignfaceError(
+                "is no signer's file: its columns are base, marker, x, y, z",
+                file=file,
+                hint="signface calibrate makes one",
+            ) from error
+
+    def at(self, face: FaceModel, layout: MarkerLayout) -> np.ndarray:
+        """(N, P, 3) bases at the markers of a layout; what is not known of the signer is the avatar's.
+
+        Raises
+        ------
+        SignfaceError
+            None of the face's bases is known at the layout's markers.
+        """
+        base_at, marker_at = ({name: i for i, name in enumerate(names)} for names in (face.names, layout.face_labels))
+        placed, known = layout.bases(face), 0
+        for base, marker, place in zip(self.bases, self.markers, self.displacements, strict=True):
+            if base in base_at and marker in marker_at:
+                placed[base_at[base], marker_at[marker]] = place
+                known += 1
+        if not known:
+            raise SignfaceError(
+                f"says nothing of the bases of {face.name} at the markers of {layout.name}",
+                file=self.source or None,
+                hint="calibrate the signer with this face and layout",
+            )
+        return placed
+
+
+@dataclass(frozen=True, eq=False)
+class SignerLevel:
+    """How a signer's weights lie, whatever is expressed.
+
+    Parameters
+    ----------
+    names : (N,) tuple of str
+        The bases.
+    mean, spread : (N,) arrays
+        Mean and standard deviation of the weight of each base over all frames.
+    """
+
+    names: tuple[str, ...]
+    mean: np.ndarray
+    spread: np.ndarray
+
+
+def signer_level(takes: Sequence[Descriptors]) -> SignerLevel:
+    """Mean and spread of the weights of a signer over some takes; every frame counts the same time.
+
+    No label is looked at, so that takes that are to be labelled can be used.
+
+    Raises
+    ------
+    SignfaceError
+        There is no take, none has a frame with weights, or they have other bases.
+    """
+    if not takes:
+        raise SignfaceError("there is no take of the signer to normalise by")
+    names = takes[0].names
+    seconds, total, squares = 0.0, np.zeros(len(names)), np.zeros(len(names))
+    for take in takes:
+        if set(take.names) != set(names):
+            raise SignfaceError(f"{take.name} was solved with other bases than {takes[0].name}")
+        weights = take.on(names).weights
+        weights = weights[np.isfinite(weights).all(axis=1)]
+        seconds += len(weights) / take.rate
+        total += weights.sum(axis=0) / take.rate
+        squares += (weights**2).sum(axis=0) / take.rate
+    if not seconds:
+        raise SignfaceError(f"{takes[0].name}: no frame has weights", hint="look at the markers: signface take info")
+    mean = total / seconds
+    return SignerLevel(names, mean, np.sqrt((squares / seconds - mean**2).clip(0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Signer:
+    """A signer: what tiers are called, bases of their own, and where their face rests.
+
+    Parameters
+    ----------
+    name : str
+        Names the tiers (`affect@NAME`); may be empty.
+    bases : SignerBases or path, optional
+        What `signface calibrate` learnt of them; the avatar's serve where there are none.
+    level : SignerLevel, optional
+        Where their weights lie over all their takes. A classifier that normalises signers needs it; without it, each
+        take is normalised by itself alone.
+
+    Raises
+    ------
+    SignfaceError
+        The file of the bases is missing or none.
+
+    See Also
+    --------
+    signface.solver.settings.SolveSettings : how any signer is solved.
+
+    Examples
+    --------
+    >>> Signer("Eva").name
+    'Eva'
+    """
+
+    name: str = ""
+    bases: SignerBases | None = None
+    level: SignerLevel | None = None
+
+    def __post_init__(self) -> None:
+        if self.bases is not None and not isinstance(self.bases, SignerBases):
+            object.__setattr__(self, "bases", SignerBases.read(self.bases))
+
+    def with_level(self, takes: Sequence[Descriptors]) -> Signer:
+        """The signer with the level of these takes of theirs (`signer_level`)."""
+        return replace(self, level=signer_level(takes))
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of what it says, but for the name and where it was read."""
+        content = {key: value for key, value in self._plain().items() if key != "name"}
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+    def _plain(self) -> dict[str, Any]:
+        found: dict[str, Any] = {"name": self.name}
+        if self.bases is not None:
+            rows = zip(self.bases.bases, self.bases.markers, self.bases.displacements.tolist(), strict=True)
+            found["bases"] = [[base, marker, *place] for base, marker, place in rows]
+        if self.level is not None:
+            level = self.level
+            found["level"] = {"names": list(level.names), "mean": level.mean.tolist(), "spread": level.spread.tolist()}
+        return found
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the signer as JSON, which `read` reads to the last bit.
+
+        Raises
+        ------
+        SignfaceError
+            The ending is not .json, or the folder cannot be written.
+        """
+        file = Path(path)
+        if file.suffix.lower() != ".json":
+            raise SignfaceError("the ending of a signer's file is .json", file=file)
+        with whole_file(file) as temporary:
+            temporary.write_text(json.dumps({"signface signer": 1, **self._plain()}, indent=1) + "\n", encoding="utf-8")
+        return file
+
+    @classmethod
+    def read(cls, path: str | PathLike[str], *, name: str | None = None) -> Signer:
+        """A signer from a file of `save`, or from bases alone (.csv of `signface calibrate`).
+
+        Parameters
+        ----------
+        path : path
+        name : str, optional
+            In place of the file's; a csv has none.
+
+        Raises
+        ------
+        SignfaceError
+            There is no such file, or it is neither.
+        """
+        file = Path(path)
+        if file.suffix.lower() != ".json":
+            return cls(name or "", bases=SignerBases.read(file))
+        try:
+            content = json.loads(file.read_text(encoding="utf-8"))
+            signer = cls(str(content["name"]), _bases(content.get("bases"), file), _level(content.get("level")))
+        except FileNotFoundError:
+            raise SignfaceError("no such file", file=file) from None
+        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+            raise SignfaceError("is no signer's file", file=file, hint="signface corpus signers makes them") from error
+        return signer if name is None else replace(signer, name=name)
+
+
+def _bases(rows: Any, file: Path) -> SignerBases | None:
+    if rows is None:
+        return None
+    places = np.array([row[2:] for row in rows], dtype=np.float64).reshape(len(rows), 3)
+    return SignerBases(tuple(str(r[0]) for r in rows), tuple(str(r[1]) for r in rows), places, source=str(file))
+
+
+def _level(content: Mapping[str, Any] | None) -> SignerLevel | None:
+    if content is None:
+        return None
+    names = tuple(str(name) for name in content["names"])
+    mean, spread = (np.array(content[key], dtype=np.float64) for key in ("mean", "spread"))
+    if mean.shape != (len(names),) or spread.shape != mean.shape or not np.isfinite([mean, spread]).all():
+        raise ValueError("the level does not match its names")
+    return SignerLevel(names, mean, spread)

@@ -1,0 +1,234 @@
+"""Calibrating a signer as a laboratory can: from a take in which named bases are shown, nobody knows how strongly.
+
+- `Shown`: when which bases are shown; `read_shown` reads it from a table.
+- `calibrate_shown`: the signer's bases at the markers.
+- `write_signer`, `read_signer`: them in a file.
+
+A range-of-motion take ("brows up, brows down, open the mouth, ...") says which base moves at a time, not how far. So
+strengths and bases are found in turns: strengths of the bases shown from the bases as known so far, within each
+window measured from the rest at its two ends; then the bases from the strengths (`signface.solver.calibration`). How
+strong a base is at most cannot be told apart from how strongly it was shown: each keeps the avatar's strength, and
+what is learnt is where and in which direction it moves the markers.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from signface.errors import SignfaceError
+from signface.face.layout import MarkerLayout
+from signface.face.model import FaceModel
+from signface.files import whole_file
+from signface.solver.calibration import calibrate
+
+#: What the avatar's bases count beside those shown, see `signface.solver.calibration.calibrate`: twice as much as where
+#: strengths are known.
+PRIOR = 1e-3
+#: Rounds of strengths and bases.
+ROUNDS = 3
+#: A base may have been shown up to this weight.
+STRONGEST = 1.5
+#: The part of a window, at each of its ends, over which the face is at rest.
+REST_SHARE = 0.06
+#: A base found to point away from the avatar's by more than this cosine is not what was asked for.
+ALIKE = 0.3
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A stretch of a range-of-motion take, from rest to rest.
+
+    Parameters
+    ----------
+    start_s, end_s : float
+        Seconds on the take's own clock.
+    bases : tuple of str
+        Names of the bases that are shown in it.
+    """
+
+    start_s: float
+    end_s: float
+    bases: tuple[str, ...]
+
+
+def read_shown(path: str | PathLike[str], names: Sequence[str]) -> list[Shown]:
+    """Read when which bases are shown: a csv with the columns `start_s, end_s, bases`.
+
+    `bases` is one name or several joined by `+`; `*` at the end of a name stands for Left and Right.
+
+    Raises
+    ------
+    SignfaceError
+        The file cannot be read, a time is not a number, a window ends before it starts, or a base is unknown.
+    """
+    import pandas as pd
+
+    try:
+        table = pd.read_csv(path, dtype=str, keep_default_na=False)
+    except FileNotFoundError:
+        raise SignfaceError("no such file", file=path) from None
+    except (OSError, ValueError) as error:
+        raise SignfaceError("cannot be read as a table", file=path) from error
+    missing = [column for column in ("start_s", "end_s", "bases") if column not in table.columns]
+    if missing or not len(table):
+        what = f"has no column {missing[0]}" if missing else "has no row"
+        raise SignfaceError(what, file=path, hint="its columns are start_s, end_s, bases")
+    found = []
+    for line, (start, end, text) in enumerate(zip(table["start_s"], table["end_s"], table["bases"]), start=2):
+        try:
+            start_s, end_s = float(start), float(end)
+        except ValueError:
+            raise SignfaceError(f"line {line}: {start!r} or {end!r} is no time in seconds", file=path) from None
+        if not (np.isfinite([start_s, end_s]).all() and start_s < end_s):
+            raise SignfaceError(f"line {line}: the window from {start} to {end} s is empty", file=path)
+        bases: list[str] = []
+        for name in (part.strip() for part in text.split("+")):
+            bases += [f"{name[:-1]}{side}" for side in ("Left", "Right")] if name.endswith("*") else [name]
+        unknown = [name for name in bases if name not in names]
+        if unknown:
+            raise SignfaceError(
+                f"line {line}: the face has no base named {unknown[0]!r}", file=path, hint=f"it has {', '.join(names)}"
+            )
+        found.append(Shown(start_s, end_s, tuple(bases)))
+    return found
+
+
+def calibrate_shown(
+    displacements: np.ndarray,
+    shown: Sequence[Shown],
+    face: FaceModel,
+    layout: MarkerLayout,
+    *,
+    rate: float,
+    start_s: float = 0.0,
+    prior: float = PRIOR,
+) -> tuple[np.ndarray, list[str]]:
+    """Bases of a signer at the markers, from a take in which they are shown.
+
+    Parameters
+    ----------
+    displacements : (F, P, 3) array
+        Of the range-of-motion take, as `signface.solver.solving.prepare_take` gives them.
+    shown : sequence of Shown
+    face : FaceModel
+    layout : MarkerLayout
+        The one that `displacements` follows.
+    rate : float
+        Frames per second.
+    start_s : float
+        Time of frame 0.
+    prior : float
+        How much the avatar's bases count, see `signface.solver.calibration.calibrate`.
+
+    Returns
+    -------
+    (N, P, 3) array, list of str
+        To be given to `ThinShellSolver` as `signer_bases`; and the names of the bases that were learnt.
+
+    Raises
+    ------
+    SignfaceError
+        No window lies in the take and shows a base that moves the markers.
+    """
+    bases = layout.bases(face)
+    energy = (bases**2).sum(axis=(1, 2))
+    moving = energy > 1e-4 * np.median(energy[energy > 0])
+    time = start_s + np.arange(len(displacements)) / rate
+    parts = []
+    for window in shown:
+        frames = np.flatnonzero((time >= window.start_s) & (time <= window.end_s))
+        own = [face.names.index(name) for name in window.bases if moving[face.names.index(name)]]
+        part = _from_rest(displacements[frames]) if len(frames) >= 10 and own else None
+        if part is not None:
+            parts.append((frames, own, part))
+    if not parts:
+        raise SignfaceError(
+            "no window of the calibration lies in the take and shows a base that moves its markers",
+            hint="its times are seconds on the take's own clock",
+        )
+    found, learnt = bases.copy(), sorted({base for _, own, _ in parts for base in own})
+    for _ in range(ROUNDS):
+        weights = np.full((len(displacements), len(bases)), np.nan)
+        moved = np.full(displacements.shape, np.nan)
+        for frames, own, part in parts:
+            columns = found[own].reshape(len(own), -1).T
+            weights[frames] = 0.0
+            solved = np.linalg.lstsq(columns, np.nan_to_num(part).reshape(len(part), -1).T, rcond=None)[0].T
+            weights[frames[:, None], own] = np.clip(solved, 0.0, STRONGEST)
+            moved[frames] = part
+        found = calibrate(moved, weights, bases, rate=rate, prior=prior)
+        for base in learnt:
+            along = float((found[base] * bases[base]).sum() / energy[base])
+            alike = along * np.sqrt(energy[base]) / max(float(np.linalg.norm(found[base])), 1e-12)
+            found[base] = found[base] / along if alike > ALIKE else bases[base]
+    return found, [face.names[base] for base in learnt]
+
+
+def _from_rest(displacements: np.ndarray) -> np.ndarray | None:
+    """Displacements from the straight line between the rest at both ends; None where a marker is not seen at rest."""
+    rest = max(2, round(REST_SHARE * len(displacements)))
+    ends = [displacements[:rest], displacements[-rest:]]
+    if any(not np.isfinite(end).any(axis=0).all() for end in ends):
+        return None
+    before, after = (np.nanmedian(end, axis=0) for end in ends)
+    share = np.linspace(0.0, 1.0, len(displacements))[:, None, None]
+    return displacements - (1.0 - share) * before - share * after
+
+
+def write_signer(
+    bases: np.ndarray, learnt: Sequence[str], face: FaceModel, layout: MarkerLayout, path: str | PathLike[str]
+) -> None:
+    """Write a signer's bases: a csv with the columns `base, marker, x, y, z`, in the face's unit.
+
+    Only bases that were learnt are written: the others are the avatar's.
+    """
+    with whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(["base", "marker", "x", "y", "z"])
+        for name in learnt:
+            for marker, place in zip(layout.face_labels, bases[face.names.index(name)], strict=True):
+                writer.writerow([name, marker, *(f"{value:.5f}" for value in place)])
+
+
+def read_signer(path: str | PathLike[str], face: FaceModel, layout: MarkerLayout) -> np.ndarray:
+    """(N, P, 3) bases of a signer at the markers of a layout; what the file does not say is the avatar's.
+
+    Raises
+    ------
+    SignfaceError
+        The file is none written by `write_signer`, or knows none of the face's bases at the layout's markers.
+    """
+    file = Path(path)
+    import pandas as pd
+
+    try:
+        table = pd.read_csv(file, dtype={"base": str, "marker": str})
+        places = table[["x", "y", "z"]].to_numpy(dtype=np.float64)
+        rows = list(zip(table["base"], table["marker"], strict=True))
+    except FileNotFoundError:
+        raise SignfaceError("no such file", file=file) from None
+    except (OSError, ValueError, KeyError) as error:
+        raise SignfaceError(
+            "is no signer's file: its columns are base, marker, x, y, z", file=file, hint="signface calibrate makes one"
+        ) from error
+    if not np.isfinite(places).all():
+        raise SignfaceError("has cells that are not numbers", file=file)
+    bases, known = layout.bases(face), 0
+    base_at, marker_at = ({name: i for i, name in enumerate(own)} for own in (face.names, layout.face_labels))
+    for (base, marker), place in zip(rows, places, strict=True):
+        if base in base_at and marker in marker_at:
+            bases[base_at[base], marker_at[marker]] = place
+            known += 1
+    if not known:
+        raise SignfaceError(
+            f"says nothing of the bases of {face.name} at the markers of {layout.name}",
+            file=file,
+            hint="calibrate the signer with this face and layout",
+        )
+    return bases

@@ -1,0 +1,125 @@
+"""Mappings learnt from pairs of markers and weights.
+
+- `RbfNetwork`: a radial basis function network (Reverdy 2019, eq. 2.13 and 2.14).
+- `GaussianProcess`: Gaussian process regression.
+- `SparseOnlineGaussianProcess`: its sparse online form (Csato and Opper, "Sparse On-Line Gaussian Processes", Neural
+  Computation 14, 2002; Reverdy 2019, 3.3.1).
+- `example_pairs`: pairs made with the avatar, where none were recorded.
+
+The three share `solve`; a missing marker is first put where the pairs would expect it from the others.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from signface.errors import SignfaceError
+from signface.face.layout import MarkerLayout
+from signface.face.model import FaceModel
+from signface.solver.base import MarkerBases, Solution, presence_patterns
+from signface.solver.rivals import gaussian_process
+
+#: Pairs made where none are given, and the jitter of their markers beside the typical displacement.
+PAIRS, JITTER = 800, 0.02
+
+
+def example_pairs(
+    face: FaceModel, layout: MarkerLayout, *, count: int = PAIRS, seed: int = 0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Expressions of the avatar: a few random bases each, and where they carry the markers.
+
+    Returns
+    -------
+    (count, P, 3) array, (count, N) array
+        Displacements in the face's unit, with a little jitter, and weights.
+    """
+    rng = np.random.default_rng(seed)
+    weights = rng.uniform(0.0, 1.0, (count, face.n_bases)) * (rng.random((count, face.n_bases)) < 0.15)
+    marked = np.tensordot(weights, layout.bases(face), axes=1)
+    return marked + rng.normal(0.0, JITTER * marked.std(), marked.shape), weights
+
+
+class _Learnt:
+    """What the three share: the pairs, and filling in of missing markers by their linear regression."""
+
+    def __init__(
+        self, face: FaceModel, layout: MarkerLayout, pairs: tuple[np.ndarray, np.ndarray] | None = None
+    ) -> None:
+        self.names = face.names
+        self.markers = MarkerBases(face, layout)
+        displacements, weights = example_pairs(face, layout) if pairs is None else pairs
+        rows, present = self.markers.checked(displacements)
+        if not present.all() or weights.shape != (len(rows), len(self.names)) or len(rows) < 2:
+            raise SignfaceError("a mapping is learnt from at least two frames with all markers and their weights")
+        self._scale = float(rows.std())
+        self._covariance = rows.T @ rows / len(rows)
+        self._learn(rows / self._scale, weights)
+
+    def solve(self, displacements: np.ndarray) -> Solution:
+        """Weights of each frame; see `signface.solver.base.Solver`."""
+        rows, present = self.markers.checked(displacements)
+        filled = rows.copy()
+        for pattern, frames in presence_patterns(present):
+            if not pattern.all():
+                seen = np.repeat(pattern, 3)
+                own = self._covariance[np.ix_(seen, seen)]
+                own = own + 1e-4 * np.trace(own) / len(own) * np.eye(len(own))
+                expected = np.linalg.solve(own, self._covariance[np.ix_(seen, ~seen)])
+                filled[np.ix_(frames, ~seen)] = rows[np.ix_(frames, seen)] @ expected
+        weights = np.concatenate(
+            [self._predict(part / self._scale) for part in np.array_split(filled, -(-len(rows) // 4096))]
+        )
+        return self.markers.solution(weights, rows, present)
+
+    def _learn(self, inputs: np.ndarray, weights: np.ndarray) -> None:
+        raise AssertionError("each mapping has its own")
+
+    def _predict(self, inputs: np.ndarray) -> np.ndarray:
+        raise AssertionError("each mapping has its own")
+
+
+def _gaussian(left: np.ndarray, right: np.ndarray, width: float) -> np.ndarray:
+    """(A, B) Gaussian kernel of (A, k) and (B, k) points."""
+    squared = (left**2).sum(axis=1)[:, None] + (right**2).sum(axis=1) - 2.0 * left @ right.T
+    return np.exp(-np.maximum(squared, 0.0) / (2.0 * width**2))
+
+
+def _median_distance(points: np.ndarray) -> float:
+    from scipy.spatial.distance import pdist
+
+    return float(np.median(pdist(points[:500])))
+
+
+class RbfNetwork(_Learnt):
+    """`sum_l c_l exp(-|x - x_l|^2 / 2 sigma^2)` with regularised coefficients (eq. 2.13 and 2.14).
+
+    `sigma` is twice the median distance between the pairs, the regularisation a thousandth.
+    """
+
+    def _learn(self, inputs: np.ndarray, weights: np.ndarray) -> None:
+        self._centres, self._width = inputs, 2.0 * _median_distance(inputs)
+        kernel = _gaussian(inputs, inputs, self._width)
+        self._coefficients = np.linalg.solve(kernel.T @ kernel + 1e-3 * np.eye(len(kernel)), kernel.T @ weights)
+
+    def _predict(self, inputs: np.ndarray) -> np.ndarray:
+        return _gaussian(inputs, self._centres, self._width) @ self._coefficients
+
+
+class GaussianProcess(_Learnt):
+    """Gaussian process regression, see `signface.solver.rivals.gaussian_process`."""
+
+    def _learn(self, inputs: np.ndarray, weights: np.ndarray) -> None:
+        self._process = gaussian_process.GaussianProcess().fit(inputs, weights)
+
+    def _predict(self, inputs: np.ndarray) -> np.ndarray:
+        return self._process.predict(inputs)
+
+
+class SparseOnlineGaussianProcess(_Learnt):
+    """A Gaussian process that takes one pair at a time and keeps the most telling of them."""
+
+    def _learn(self, inputs: np.ndarray, weights: np.ndarray) -> None:
+        self._process = gaussian_process.SparseOnlineGaussianProcess().fit(inputs, weights)
+
+    def _predict(self, inputs: np.ndarray) -> np.ndarray:
+        return self._process.predict(inputs)

@@ -1,0 +1,139 @@
+"""How a recording is solved, as one object that every door knows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from signface.errors import SignfaceError
+from signface.settings import Settings, option
+
+#: name: what it is, for `--help` and reports.
+METHODS = {
+    "thin-shell": "least bending and stretching of the skin, soft bounds (the default)",
+    "least-squares": "least squares without bounds",
+    "nnls": "non-negative least squares",
+    "bounded": "least squares with weights from 0 to 1",
+    "direct-shell": "the skin bent by the markers alone, then read as weights",
+    "rbf-network": "a radial basis function network learnt from examples of the avatar",
+    "gaussian-process": "Gaussian process regression learnt from examples of the avatar",
+    "sparse-online-gp": "its sparse online form",
+}
+
+
+@dataclass(frozen=True)
+class SolveSettings(Settings):
+    """How markers become weights (Reverdy 2019, 5.2); validated when it is made.
+
+    The fields say in their metadata what they decide. None stands for the method's own value.
+
+    Raises
+    ------
+    SignfaceError
+        A value is not of its kind or outside its range.
+
+    See Also
+    --------
+    signface.signer.Signer : who signs, with bases and level of their own.
+    signface.settings.read_settings : the settings of a laboratory's TOML.
+
+    Examples
+    --------
+    >>> settings = SolveSettings(alpha=0.3)
+    >>> settings.chosen
+    {'alpha': 0.3}
+    >>> SolveSettings.from_dict(settings.as_dict()) == settings
+    True
+    """
+
+    TABLE = "solve"
+
+    face: str = option(
+        "default", help="a shipped face or a file (.glb, .wfm) or folder of .obj", metavar="FACE", path=True
+    )
+    layout: str | None = option(
+        None,
+        help="a shipped layout or a .csv (default: the shipped layout that fits the markers best)",
+        metavar="LAYOUT",
+        path=True,
+    )
+    neutral: str | float = option(
+        "auto", help="time of a frame with a neutral face, or auto", kind=object, metavar="SECONDS"
+    )
+    method: str = option("thin-shell", help="how weights are solved", choices=tuple(METHODS), metavar="METHOD")
+    alpha: float | None = option(
+        None, help="weight of the thin shell, 0 to 1 (default: the method's own)", kind=float, metavar="A"
+    )
+    adaptation: str = option(
+        "similarity", help="how displacements are carried to the avatar", choices=("similarity", "rbf")
+    )
+    sparsity: float | None = option(None, help="pull towards rest, 0 or more (default: 0.006)", kind=float, metavar="S")
+    head_slack: float | None = option(
+        None, help="how far head markers may creep, 0 trusts them (default: 0.3)", kind=float, metavar="H"
+    )
+    slip: float | None = option(
+        None,
+        help="how far off a marker counts in full, beside a typical displacement; 0 trusts all (default: 0.4)",
+        kind=float,
+        metavar="D",
+    )
+    creep: bool | None = option(
+        None, help="do not take away what the markers creep on the skin", kind=bool, flag="--keep-creep"
+    )
+    short_gap_s: float | None = option(
+        None,
+        help="longest gap that a spline fills (default: 0.05 s)",
+        kind=float,
+        flag="--short-gap",
+        metavar="SECONDS",
+    )
+    long_gap_s: float | None = option(
+        None,
+        help="longest gap that neighbouring markers fill (default: 0.5 s)",
+        kind=float,
+        flag="--long-gap",
+        metavar="SECONDS",
+    )
+    cutoff_hz: float | None = option(
+        None, help="what changes faster is filtered out (default: 12 Hz)", kind=float, flag="--cutoff", metavar="HZ"
+    )
+    filter_method: str = option(
+        "butterworth", help="the filter", choices=("butterworth", "raised-sine"), flag="--filter"
+    )
+    head_fallback: str | None = option(
+        None,
+        help="least-moving: carry the head by the least-moving markers where head markers do not suffice",
+        choices=("least-moving",),
+        metavar="least-moving",
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.neutral != "auto":
+            try:
+                object.__setattr__(self, "neutral", float(self.neutral))
+            except (TypeError, ValueError):
+                raise SignfaceError(f"neutral is neither a time in seconds nor auto: {self.neutral!r}") from None
+        for name in ("sparsity", "head_slack", "slip", "short_gap_s", "long_gap_s", "cutoff_hz"):
+            value = getattr(self, name)
+            if value is not None and not 0 <= value < float("inf"):
+                raise SignfaceError(f"{name} is 0 or more, not {value:g}")
+
+    @property
+    def solver_options(self) -> dict[str, float]:
+        """What the method is told: those of `alpha`, `sparsity`, `head_slack` and `slip` that are given."""
+        named = {name: getattr(self, name) for name in ("alpha", "sparsity", "head_slack", "slip")}
+        return {name: value for name, value in named.items() if value is not None}
+
+    @property
+    def takes_creep_away(self) -> bool:
+        """Whether creep is taken away: by default for the thin shell, and not for its rivals."""
+        return self.method == "thin-shell" if self.creep is None else self.creep
+
+    def differences(self, other: SolveSettings) -> list[str]:
+        """What would give other weights under `other`, in words; not whose take it is: layout and neutral frame."""
+        ours, theirs = self.as_dict(), other.as_dict()
+        return [
+            f"{name} {theirs[name]} instead of {ours[name]}"
+            for name in ours
+            if name not in ("layout", "neutral") and ours[name] != theirs[name]
+        ]
