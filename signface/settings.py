@@ -5,7 +5,8 @@
 - `option`: a field of one.
 
 The decisions themselves stand in their rooms: `signface.solver.settings.SolveSettings`,
-`signface.learn.settings.TrainingSettings`, `signface.elan.options.EafOptions`; `signface.laboratory` reads them from a TOML.
+`signface.learn.settings.TrainingSettings`, `signface.elan.options.EafOptions`. `signface.laboratory` reads them from a
+TOML.
 """
 
 from __future__ import annotations
