@@ -1,7 +1,7 @@
 """Files that appear whole or not at all, and the folder of data that ships with signface.
 
 - `whole_file`: write beside the target, then rename over it.
-- `models_folder`, `shipped`: where the default face, the layouts and the trained classifiers live.
+- `DATA`, `models_folder`, `shipped`, `bundled_corpus`: where the data live that ship.
 """
 
 from __future__ import annotations
@@ -14,6 +14,11 @@ from os import PathLike
 from pathlib import Path
 
 from signface.errors import SignfaceError
+
+_PACKAGE = Path(__file__).resolve().parent
+
+#: Where `models` and `corpora/mini` stand: in an installed package itself, in a checkout beside it.
+DATA = _PACKAGE if (_PACKAGE / "models").is_dir() else _PACKAGE.parent
 
 
 @contextlib.contextmanager
@@ -58,10 +63,8 @@ def whole_file(path: str | PathLike[str]) -> Iterator[Path]:
 
 
 def models_folder() -> Path:
-    """The folder of shipped data: `signface/models` in an installed package, `models/` in a checkout."""
-    here = Path(__file__).resolve().parent
-    installed = here / "models"
-    return installed if installed.is_dir() else here.parent / "models"
+    """The folder of the faces, layouts, classifiers and rules that ship."""
+    return DATA / "models"
 
 
 def shipped(kind: str, suffix: str) -> dict[str, Path]:
@@ -71,7 +74,5 @@ def shipped(kind: str, suffix: str) -> dict[str, Path]:
 
 
 def bundled_corpus() -> Path:
-    """The folder of the small synthetic corpus: `corpora/mini` of a checkout, packaged with signface otherwise."""
-    here = Path(__file__).resolve().parent
-    installed = here / "corpora" / "mini"
-    return installed if installed.is_dir() else here.parent / "corpora" / "mini"
+    """The folder of the small synthetic corpus."""
+    return DATA / "corpora" / "mini"

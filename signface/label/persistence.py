@@ -63,6 +63,9 @@ TRUSTED = (
     "sklearn.tree._tree.Tree",
 )
 
+#: Classifiers that ship with the project but not in the installed package, which would be twice as large with them.
+ONLY_IN_CHECKOUTS = ("thesis-forest",)
+
 #: No trained classifier of ours unpacks to more (bytes): a small file that does is no honest one.
 LARGEST = 2 * 1024**3
 
@@ -224,6 +227,11 @@ def _found(name_or_path: str | PathLike[str]) -> Path:
     """The file of a shipped classifier, or the path itself when there is such a file."""
     ours = shipped("classifiers", ".skops")
     file = ours.get(str(name_or_path), Path(name_or_path))
+    if not file.is_file() and str(name_or_path) in ONLY_IN_CHECKOUTS:
+        raise SignfaceError(
+            f"the classifier {name_or_path} is too large to come with an installed signface",
+            hint=f"take models/classifiers/{name_or_path}.skops from a checkout of the project and name that file",
+        )
     if not file.is_file():
         hint = f"name a .skops file or a shipped classifier ({', '.join(ours) or 'there is none'})"
         raise SignfaceError("no such classifier", file=file, hint=hint)

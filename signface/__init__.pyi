@@ -1,0 +1,77 @@
+from . import datasets
+from .annotation import Annotation, annotate, summarise
+from .corpus.manifest import Corpus, read_corpus
+from .corpus.running import run_corpus
+from .descriptors import Descriptors, read_weights, write_weights
+from .elan.options import EafOptions
+from .elan.reference import read_reference, read_tiers
+from .errors import SignfaceError, SignfaceWarning
+from .evaluation.protocol import folds_of
+from .face.layout import MarkerLayout
+from .face.layout_files import choose_layout, read_layout
+from .face.model import FaceModel
+from .face.reading import read_face
+from .label.labellers import make_labeller
+from .label.labelling import label_segments
+from .label.model import TrainedModel
+from .label.persistence import load_model, save_model
+from .laboratory import read_settings
+from .learn.examples import Example, frame_table
+from .learn.settings import TrainingSettings
+from .metrics.agreement import agreement_table
+from .render.still import draw_face
+from .report.timeline import draw_timeline
+from .segmentation.cutting import segment
+from .segmentation.energy import energies
+from .segmentation.segments import Segments, read_segments, write_segments
+from .signer import Signer
+from .solver.settings import SolveSettings
+from .takes.reading import open_recording, read_recording, read_take
+from .takes.take import Take
+
+__all__ = [
+    "Annotation",
+    "Corpus",
+    "Descriptors",
+    "EafOptions",
+    "Example",
+    "FaceModel",
+    "MarkerLayout",
+    "Segments",
+    "Signer",
+    "SignfaceError",
+    "SignfaceWarning",
+    "SolveSettings",
+    "Take",
+    "TrainedModel",
+    "TrainingSettings",
+    "agreement_table",
+    "annotate",
+    "choose_layout",
+    "datasets",
+    "draw_face",
+    "draw_timeline",
+    "energies",
+    "folds_of",
+    "frame_table",
+    "label_segments",
+    "load_model",
+    "make_labeller",
+    "open_recording",
+    "read_corpus",
+    "read_face",
+    "read_layout",
+    "read_recording",
+    "read_reference",
+    "read_segments",
+    "read_settings",
+    "read_take",
+    "read_tiers",
+    "read_weights",
+    "run_corpus",
+    "save_model",
+    "segment",
+    "summarise",
+    "write_segments",
+    "write_weights",
+]
