@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
+    from signface.solve_settings import SolveSettings
+
 
 @dataclass(frozen=True)
 class Descriptors:
@@ -48,6 +50,8 @@ class Descriptors:
         What was done, oldest first.
     deviation : (F, N) float64 array, optional
         Standard deviation of each weight; NaN where the markers say nothing. None when it was not asked for.
+    settings : SolveSettings, optional
+        How the weights were solved; None where that is not known, or nothing was solved.
     """
 
     weights: np.ndarray
@@ -59,6 +63,7 @@ class Descriptors:
     name: str = "take"
     history: tuple[str, ...] = field(default=())
     deviation: np.ndarray | None = None
+    settings: SolveSettings | None = None
 
     def __post_init__(self) -> None:
         weights = np.array(self.weights, dtype=np.float64)

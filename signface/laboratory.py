@@ -16,7 +16,7 @@ from signface.elan.options import EafOptions
 from signface.errors import SignfaceError
 from signface.learn.settings import TrainingSettings
 from signface.settings import Settings
-from signface.solver.settings import SolveSettings
+from signface.solve_settings import SolveSettings
 
 
 @dataclass(frozen=True)

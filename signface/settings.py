@@ -4,7 +4,7 @@
   laboratory's TOML call them; validated once, when it is made.
 - `option`: a field of one.
 
-The decisions themselves stand in their rooms: `signface.solver.settings.SolveSettings`,
+The decisions themselves stand in their rooms: `signface.solve_settings.SolveSettings`,
 `signface.learn.settings.TrainingSettings`, `signface.elan.options.EafOptions`. `signface.laboratory` reads them from a
 TOML.
 """

@@ -167,7 +167,7 @@ class Signer:
 
     See Also
     --------
-    signface.solver.settings.SolveSettings : how any signer is solved.
+    signface.solve_settings.SolveSettings : how any signer is solved.
 
     Examples
     --------

@@ -25,7 +25,10 @@ from signface.errors import SignfaceError
 from signface.files import shipped
 
 #: The modules between a recording and its descriptors.
-SOLVING_CODE = ("takes", "face", "solver", "frames.py", "descriptors.py", "annotation.py", "corpus/describing.py")
+SOLVING_CODE = (
+    *("takes", "face", "solver", "corpus/describing.py", "annotation.py"),
+    *("descriptors.py", "frames.py", "settings.py", "solve_settings.py"),
+)
 
 #: Recordings that hold weights: there is nothing to solve, and neither face nor layout matter.
 WEIGHTS_FORMATS = ("weights", "livelink")

@@ -1,4 +1,7 @@
-"""How a recording is solved, as one object that every door knows."""
+"""How a recording is solved, as one object that every door knows.
+
+It stands at the top of the package because descriptors and models carry it.
+"""
 
 from __future__ import annotations
 
