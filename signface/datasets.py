@@ -4,6 +4,7 @@
 - `mini_take`: one of its recordings; `mini_file`, its file.
 - `mini_weights`: the weights that the recording was made from, which a solve should find.
 - `mini_reference`: its reference annotation.
+- `mini_examples`: weights and references of all takes, to train on without solving.
 
 The takes are `M1_IE_J` (isolated expressions of joy), `M1_EU_11` and `M2_EU_04` (utterances) and `M2_SE_A` (a sequence
 of expressions), by two signers, `M1` and `M2`.
@@ -20,10 +21,11 @@ from signface.files import bundled_corpus
 if TYPE_CHECKING:
     from signface.corpus.manifest import Corpus
     from signface.descriptors import Descriptors
+    from signface.learn.examples import Example
     from signface.segmentation.segments import Segments
     from signface.takes.take import Take
 
-__all__ = ["mini_corpus", "mini_file", "mini_reference", "mini_take", "mini_weights"]
+__all__ = ["mini_corpus", "mini_examples", "mini_file", "mini_reference", "mini_take", "mini_weights"]
 
 
 def mini_corpus() -> Corpus:
@@ -125,6 +127,37 @@ def mini_reference(name: str = "M2_EU_04") -> Segments:
     from signface.elan.reference import read_reference
 
     return read_reference(_file(name, f"reference/{name}.eaf"))
+
+
+def mini_examples() -> list[Example]:
+    """The four takes as training wants them, with the weights that they were made from: nothing is solved.
+
+    See Also
+    --------
+    signface.solve_corpus : the same of any corpus, solved.
+
+    See Also
+    --------
+    signface.solve_corpus : the same of any corpus, solved.
+
+    Examples
+    --------
+    >>> [(example.signer, example.kind, len(example.stable)) for example in mini_examples()]
+    [('M1', 'IE', 5), ('M1', 'EU', 4), ('M2', 'SE', 5), ('M2', 'EU', 3)]
+    """
+    from signface.learn.examples import Example
+
+    return [
+        Example(
+            take=entry.name,
+            signer=entry.signer,
+            kind=entry.kind,
+            descriptors=mini_weights(entry.name),
+            reference=mini_reference(entry.name),
+            sentence=entry.sentence,
+        )
+        for entry in mini_corpus()
+    ]
 
 
 def _file(name: str, place: str) -> Path:

@@ -20,6 +20,15 @@ class SignfaceError(Exception):
         The file concerned; it opens the message.
     hint : str, optional
         What to do about it; it closes the message.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> try:
+    ...     sf.read_take("absent.c3d")
+    ... except sf.SignfaceError as error:
+    ...     print(error)
+    absent.c3d: no such file
     """
 
     def __init__(self, problem: str, *, file: str | PathLike[str] | None = None, hint: str | None = None) -> None:

@@ -106,8 +106,10 @@ def check_corpus(
 
     Examples
     --------
-    >>> for problem in check_corpus("corpora/feel").problems:  # doctest: +SKIP
-    ...     print(problem)
+    >>> import signface as sf
+    >>> checked = check_corpus(sf.datasets.mini_file().parent)
+    >>> len(checked.problems)
+    0
     """
     file = Path(path)
     if file.is_dir():

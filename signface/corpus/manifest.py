@@ -85,6 +85,17 @@ class Corpus:
     folder : Path
         Where the manifest lies.
     takes : tuple of TakeEntry
+
+    See Also
+    --------
+    signface.read_corpus : where it comes from.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> corpus = sf.datasets.mini_corpus()
+    >>> len(corpus.takes), corpus.signers
+    (4, ('M1', 'M2'))
     """
 
     folder: Path
@@ -116,7 +127,10 @@ class Corpus:
 
         Examples
         --------
-        >>> corpus.select(kinds=["IE", "SE"], signers=["S1"])  # doctest: +SKIP
+        >>> import signface as sf
+        >>> corpus = sf.datasets.mini_corpus()
+        >>> [take.name for take in corpus.select(kinds=["IE", "SE"], signers=["M1"])]
+        ['M1_IE_J']
         """
         for word, wanted, present in (("kind", kinds, self.kinds), ("signer", signers, self.signers)):
             unknown = sorted(set(wanted or ()) - set(present))
@@ -153,8 +167,10 @@ def read_corpus(path: str | PathLike[str]) -> Corpus:
 
     Examples
     --------
-    >>> corpus = read_corpus("corpora/mini")  # doctest: +SKIP
-    >>> [take.name for take in corpus.select(kinds=["EU"])]  # doctest: +SKIP
+    >>> import signface as sf
+    >>> corpus = sf.read_corpus(sf.datasets.mini_file().parent)
+    >>> [take.name for take in corpus.select(kinds=["EU"])]
+    ['M1_EU_11', 'M2_EU_04']
     """
     file = Path(path)
     if file.is_dir():

@@ -176,8 +176,12 @@ def run_corpus(
 
     Examples
     --------
-    >>> for outcome in run_corpus(read_corpus("corpora/feel")):  # doctest: +SKIP
+    >>> from shutil import copytree
+    >>> import signface as sf
+    >>> corpus = sf.read_corpus(copytree(sf.datasets.mini_file().parent, "feel"))
+    >>> for outcome in run_corpus(corpus.select(kinds=["IE"]), workers=1):
     ...     print(outcome.take, outcome.state)
+    M1_IE_J done
     """
     folder = Path(os.path.abspath(corpus.folder))
     output = folder / ANNOTATED if output is None else Path(os.path.abspath(output))

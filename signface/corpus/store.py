@@ -65,8 +65,17 @@ class DescriptorStore:
 
     Examples
     --------
-    >>> store = DescriptorStore("corpora/feel")  # doctest: +SKIP
-    >>> store.read(origin)  # None, or exactly what was written  # doctest: +SKIP
+    >>> import signface as sf
+    >>> from signface.corpus.origin import find_origin, weights_recipe
+    >>> corpus = sf.datasets.mini_corpus()
+    >>> entry = corpus.takes[0]
+    >>> origin = find_origin(entry, corpus.folder, weights_recipe())
+    >>> store = DescriptorStore("feel")
+    >>> print(store.read(origin))
+    None
+    >>> written = store.write(origin, sf.datasets.mini_weights(entry.name))
+    >>> store.read(origin).n_frames
+    2149
     """
 
     def __init__(self, corpus: str | PathLike[str]) -> None:
@@ -160,7 +169,18 @@ class DescriptorStore:
 
         Examples
         --------
-        >>> store.query("SELECT take, avg(residual_mm) FROM descriptors GROUP BY take")  # doctest: +SKIP
+        >>> import signface as sf
+        >>> from signface.corpus.origin import find_origin, weights_recipe
+        >>> corpus, store = sf.datasets.mini_corpus(), DescriptorStore("asked")
+        >>> for entry in corpus:
+        ...     origin = find_origin(entry, corpus.folder, weights_recipe())
+        ...     written = store.write(origin, sf.datasets.mini_weights(entry.name))
+        >>> print(store.query("SELECT take, count(*) AS frames FROM descriptors GROUP BY take ORDER BY take"))
+               take  frames
+        0  M1_EU_11    1195
+        1   M1_IE_J    2149
+        2  M2_EU_04    1184
+        3   M2_SE_A    1758
         """
         try:
             import duckdb

@@ -52,6 +52,22 @@ def read_reference(
     SignfaceError
         The file is no EAF, the tier is missing, annotations overlap or have no time, or a label is outside the
         vocabulary.
+
+    See Also
+    --------
+    signface.read_tiers : every tier, whatever it holds.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> file = sf.datasets.mini_file().with_name("reference") / "M2_EU_04.eaf"
+    >>> print(sf.read_reference(file).table)
+       start_s  end_s        kind label  intensity
+    0    0.000  2.846      stable     N       <NA>
+    1    2.846  3.031  transition    ND       <NA>
+    2    3.031  4.641      stable     D          3
+    3    4.641  5.160  transition    DN       <NA>
+    4    5.160  5.922      stable     N       <NA>
     """
     file = Path(eaf)
     root = read_document(file).getroot()
@@ -76,6 +92,18 @@ def read_tiers(eaf: str | PathLike[str]) -> dict[str, pd.DataFrame]:
     ------
     SignfaceError
         The file is no EAF, or is broken (`checking.check_document`).
+
+    See Also
+    --------
+    signface.read_reference : the affect tier, checked.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> file = sf.datasets.mini_file().with_name("reference") / "M2_EU_04.eaf"
+    >>> for name, table in sf.read_tiers(file).items():
+    ...     print(name, len(table))
+    affect@M2 5
     """
     file = Path(eaf)
     root = read_document(file).getroot()

@@ -123,6 +123,16 @@ def folds_of(
     ------
     SignfaceError
         There is no such protocol, a set is empty, `across` has one signer only, or there are too few takes for turns.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> examples = sf.datasets.mini_examples()
+    >>> folds = folds_of(examples, protocol="across", train_kinds=["IE", "SE"], test_kinds=["EU"])
+    >>> for fold in folds:
+    ...     print(fold.signer, [example.take for example in fold.train], [example.take for example in fold.test])
+    M1 ['M2_SE_A'] ['M1_EU_11']
+    M2 ['M1_IE_J'] ['M2_EU_04']
     """
     if protocol not in PROTOCOLS:
         raise SignfaceError(f"there is no protocol named {protocol}", hint=f"choose {' or '.join(PROTOCOLS)}")

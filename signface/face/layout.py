@@ -30,6 +30,17 @@ class MarkerLayout:
         Weights of those vertices, summing to 1 (0 where there is no point).
     name : str
         Name of the layout.
+
+    See Also
+    --------
+    signface.read_layout, signface.choose_layout : where layouts come from.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> layout = sf.read_layout("default-40", sf.read_face())
+    >>> layout.face_labels[:3]
+    ('LBROI', 'RBROI', 'LBROM')
     """
 
     labels: tuple[str, ...]

@@ -46,6 +46,17 @@ def read_layout(name_or_path: str | PathLike[str], face: FaceModel) -> MarkerLay
     SignfaceError
         The file is missing or no layout, a role is unknown, a marker is repeated or has no place, a vertex is not in
         the face, or a point is far from its skin.
+
+    See Also
+    --------
+    signface.choose_layout : the one that fits a recording.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> layout = sf.read_layout("default-40", sf.read_face())
+    >>> len(layout.face_labels), layout.head_labels
+    (40, ('HEADF', 'HEADL', 'HEADR', 'HEADTL', 'HEADTR', 'HEADB'))
     """
     known = shipped("layouts", ".csv")
     file = known.get(str(name_or_path), Path(name_or_path))
@@ -153,6 +164,16 @@ def choose_layout(take_labels: Sequence[str], face: FaceModel) -> MarkerLayout:
     ------
     SignfaceError
         No shipped layout recognises enough of them.
+
+    See Also
+    --------
+    signface.read_layout : a layout by its name, or a file.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> sf.choose_layout(sf.datasets.mini_take().labels, sf.read_face()).name
+    'default-40'
     """
     bare = {label.rsplit(":", 1)[-1].strip().casefold() for label in take_labels}
     best, fit = None, 0

@@ -39,6 +39,17 @@ class FaceModel:
     ------
     SignfaceError
         Shapes disagree, a value is not finite, or a name is repeated.
+
+    See Also
+    --------
+    signface.read_face : where faces come from.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> face = sf.read_face()
+    >>> face.n_bases, face.names[:2]
+    (51, ('eyeBlinkLeft', 'eyeLookDownLeft'))
     """
 
     mesh: Mesh

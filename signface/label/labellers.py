@@ -64,6 +64,17 @@ def make_labeller(
     ------
     SignfaceError
         There is no classifier of that name, or it has no such parameter.
+
+    See Also
+    --------
+    signface.frame_table : what it is fitted to.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> X, y, _, _ = sf.frame_table(sf.datasets.mini_examples())
+    >>> make_labeller("knn3").fit(X, y).predict(X[:1]).tolist()
+    ['N']
     """
     weight = "balanced" if balanced else None
     estimator: Any

@@ -140,6 +140,18 @@ def label_segments(
     ------
     SignfaceError
         The model was trained on other bases, or no segment has weights.
+
+    See Also
+    --------
+    signface.annotate : from a recording on, with the segments of the model.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> weights = sf.datasets.mini_weights()
+    >>> labelled = label_segments(weights, sf.segment(weights), sf.load_model())
+    >>> labelled.table["label"].tolist()
+    ['N', 'ND', 'D', 'DN', 'N']
     """
     states = _states(segments)
     samples = np.array([state.sample for state in states])

@@ -97,6 +97,17 @@ class TrainedModel:
     name : str
     intensity : IntensityClassifier, optional
         What gives stable segments their intensity, where it was trained.
+
+    See Also
+    --------
+    signface.load_model, signface.train : where models come from.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> model = sf.load_model()
+    >>> model.name, model.card.corpus
+    ('default', 'synthetic (signface synth)')
     """
 
     estimator: ClassifierMixin

@@ -77,6 +77,17 @@ def save_model(model: TrainedModel, path: str | PathLike[str]) -> None:
     ------
     SignfaceError
         The ending is not .skops, or the folder cannot be written.
+
+    See Also
+    --------
+    signface.load_model : the way back.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> sf.save_model(sf.load_model(), "mine.skops")
+    >>> sf.load_model("mine.skops").name
+    'mine'
     """
     import skops.io
 
@@ -138,10 +149,17 @@ def load_model(name_or_path: str | PathLike[str] = "default", *, quickly: bool =
         The file is missing, cut off, no classifier of signface, holds other types, or its estimator and its card
         do not belong together.
 
+    See Also
+    --------
+    signface.train : a classifier of one's own.
+    signface.save_model : the way to disk.
+
     Examples
     --------
-    >>> load_model("default").card.classifier  # doctest: +SKIP
-    'forest'
+    >>> import signface as sf
+    >>> model = sf.load_model()
+    >>> model.card.classifier, model.card.labels
+    ('gru', ('A', 'D', 'F', 'J', 'N', 'Sa', 'Su'))
     """
     file = _found(name_or_path)
     card = read_card(file)

@@ -60,6 +60,19 @@ class Example:
         With the column `label`: labels of stable segments, names of transitions; perhaps `intensity` (1, 2 or 3).
     sentence : str, optional
         What is signed, where the corpus names it: takes of one sentence are alike.
+
+    See Also
+    --------
+    signface.solve_corpus : the examples of a corpus.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> example = sf.datasets.mini_examples()[0]
+    >>> example.take, example.signer, example.kind
+    ('M1_IE_J', 'M1', 'IE')
+    >>> example.stable["label"].tolist()
+    ['N', 'J', 'N', 'J', 'N']
     """
 
     take: str
@@ -185,8 +198,12 @@ def frame_table(
     Examples
     --------
     >>> from sklearn.model_selection import LeaveOneGroupOut, cross_val_score
-    >>> X, y, takes, signers = frame_table(examples)  # doctest: +SKIP
-    >>> cross_val_score(make_labeller("forest"), X, y, groups=signers, cv=LeaveOneGroupOut())  # doctest: +SKIP
+    >>> import signface as sf
+    >>> X, y, takes, signers = frame_table(sf.datasets.mini_examples())
+    >>> X.shape, len(set(y)), len(set(takes))
+    ((272, 51), 5, 4)
+    >>> len(cross_val_score(sf.make_labeller("knn3"), X, y, groups=signers, cv=LeaveOneGroupOut()))
+    2
     """
     if not examples:
         raise SignfaceError("there is no annotated take", hint="name other kinds or another signer")

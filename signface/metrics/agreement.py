@@ -300,6 +300,16 @@ def agreement_table(
         `annotators`, `annotations` (of each), `matched`, `agreement` (share of the time), `cohen_kappa`,
         `modified_kappa`, `modified_kappa_max`, `krippendorff_alpha`, `gamma`, `start_ms` and `end_ms` (median
         absolute distance of matched boundaries).
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> reference, weights = sf.datasets.mini_reference(), sf.datasets.mini_weights()
+    >>> automatic = sf.label_segments(weights, sf.segment(weights), sf.load_model())
+    >>> table = agreement_table({"reference": reference.table, "automatic": automatic.table})
+    >>> print(table[["annotators", "cohen_kappa", "modified_kappa"]].round(2))
+                  annotators  cohen_kappa  modified_kappa
+    0  reference / automatic         0.88            0.73
     """
     rows = []
     for (name, first), (other, second) in combinations(annotators.items(), 2):

@@ -47,6 +47,13 @@ def draw_timeline(
     -------
     matplotlib.figure.Figure
         Save it with `save_figure`.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> weights = sf.datasets.mini_weights()
+    >>> figure = draw_timeline(weights, sf.segment(weights), reference=sf.datasets.mini_reference())
+    >>> figure.savefig("timeline.png")
     """
     from matplotlib.figure import Figure
 

@@ -286,8 +286,10 @@ def read_study(folder: str | PathLike[str], *, films: bool = True) -> Study:
 
     Examples
     --------
-    >>> study = read_study("signface/study/examples/group-1", films=False)  # doctest: +SKIP
-    >>> len(study.stimuli)  # doctest: +SKIP
+    >>> from pathlib import Path
+    >>> import signface as sf
+    >>> study = read_study(Path(sf.__file__).parent / "study/examples/group-1", films=False)
+    >>> len(study.stimuli)
     54
     """
     file = Path(folder)

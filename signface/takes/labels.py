@@ -131,8 +131,11 @@ def rename_to(take: Take, labels: Sequence[str]) -> Take:
 
     Examples
     --------
-    >>> rename_to(take, layout.labels).labels  # doctest: +SKIP
-    ('LBRO1', 'LBRO2', ...)
+    >>> import signface as sf
+    >>> take = sf.datasets.mini_take()
+    >>> layout = sf.choose_layout(take.labels, sf.read_face())
+    >>> rename_to(take, layout.labels).labels == take.labels
+    True
     """
     found, note = find_labels(take, labels)
     return take.changed(note, positions=take.select(list(found.values())), labels=tuple(found))

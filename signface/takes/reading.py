@@ -132,6 +132,17 @@ def open_recording(path: str | PathLike[str], *, unit: str | None = None) -> Tak
     ------
     SignfaceError
         The file cannot be read as a recording; the message says why.
+
+    See Also
+    --------
+    signface.read_take : all of it in memory.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> recording = sf.open_recording(sf.datasets.mini_file())
+    >>> recording.n_frames, recording.frames(0, 100).shape
+    (1184, (100, 46, 3))
     """
     file = Path(path)
     kind = recognise(file)
@@ -172,11 +183,16 @@ def read_recording(path: str | PathLike[str], *, unit: str | None = None) -> Tak
     -------
     Take or Descriptors
 
+    See Also
+    --------
+    signface.read_take : markers only.
+
     Examples
     --------
-    >>> take = read_recording("take.c3d")  # doctest: +SKIP
-    >>> take.n_frames, take.rate  # doctest: +SKIP
-    (12000, 200.0)
+    >>> import signface as sf
+    >>> recording = sf.read_recording(sf.datasets.mini_file())
+    >>> type(recording).__name__, recording.duration
+    ('Take', 5.92)
     """
     recording = open_recording(path, unit=unit)
     if not isinstance(recording, TakeFile):
@@ -199,6 +215,18 @@ def read_take(path: str | PathLike[str], *, unit: str | None = None) -> Take:
     ------
     SignfaceError
         As `read_recording`, or the file holds weights.
+
+    See Also
+    --------
+    signface.read_recording : also what a phone captured.
+    signface.open_recording : without reading it all into memory.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> take = sf.read_take(sf.datasets.mini_file("M1_IE_J"))
+    >>> take.n_frames, take.rate, take.labels[:3]
+    (2149, 200.0, ('LBROI', 'RBROI', 'LBROM'))
     """
     recording = read_recording(path, unit=unit)
     if isinstance(recording, Descriptors):
