@@ -25,7 +25,7 @@ from .segmentation.cutting import segment
 from .segmentation.energy import energies
 from .segmentation.segments import Segments, read_segments, write_segments
 from .signer import Signer
-from .solver.settings import SolveSettings
+from .solve_settings import SolveSettings
 from .takes.reading import open_recording, read_recording, read_take
 from .takes.take import Take
 
