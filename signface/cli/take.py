@@ -24,10 +24,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         epilog=f"example:\n{EXAMPLE}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    info.add_argument("takes", nargs="+", metavar="TAKE", help="a recording: C3D, TRC, TSV, CSV, .pose")
+    info.add_argument("takes", nargs="+", metavar="TAKE", help="a recording, in one of the formats of --formats")
+    info.add_argument("--formats", action=_ListFormats, help="list the formats that signface reads, and leave")
     info.add_argument("--unit", help="unit of length of the files (mm, cm, m, in), where they say none or a wrong one")
     info.add_argument("--face", default="default", help="face whose layouts are tried (default: the shipped one)")
     info.add_argument("--json", action="store_true", help="print JSON, for scripts")
+
+
+class _ListFormats(argparse.Action):
+    """Prints the formats and ends, as `--help` does; they are imported when they are asked for."""
+
+    def __init__(self, option_strings: list[str], dest: str, help: str | None = None) -> None:
+        super().__init__(option_strings, dest, nargs=0, help=help)
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from signface.takes.formats.registry import supported_formats
+
+        for format in supported_formats():
+            endings = f" ({', '.join(format.endings)})" if format.endings else ""
+            print(f"{format.name:10} {format.title}{endings}: {format.holds}; written by {format.written_by}")
+        parser.exit()
 
 
 def _recognised(take: Take, face_name: str) -> dict[str, Any]:

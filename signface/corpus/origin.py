@@ -30,9 +30,6 @@ SOLVING_CODE = (
     *("descriptors.py", "frames.py", "settings.py", "solve_settings.py"),
 )
 
-#: Recordings that hold weights: there is nothing to solve, and neither face nor layout matter.
-WEIGHTS_FORMATS = ("weights", "livelink")
-
 
 @dataclass(frozen=True)
 class Recipe:
@@ -156,9 +153,9 @@ def find_origin(entry: TakeEntry, folder: Path, recipe: Recipe) -> Origin:
     SignfaceError
         The recording cannot be read, or is of no known format.
     """
-    from signface.takes.reading import recognise
+    from signface.takes.formats.registry import format_of
 
-    holds_weights = recognise(entry.path) in WEIGHTS_FORMATS
+    holds_weights = format_of(entry.path).holds == "weights"  # nothing to solve: neither face nor layout matter
     return Origin(
         take=take_name(entry, folder),
         file=entry.path.name,

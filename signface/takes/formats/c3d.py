@@ -18,12 +18,28 @@ import numpy as np
 from signface.errors import SignfaceError
 from signface.files import whole_file
 from signface.takes.formats.c3d_structure import MOST_FRAMES, Structure, read_structure
+from signface.takes.formats.registry import FileHead, register_format
 from signface.takes.formats.units import SAMPLE, unit_factor
 from signface.takes.labels import clean_labels
 from signface.takes.recording import TakeFile
 from signface.takes.take import Take
 
 
+def _certainty(head: FileHead) -> float:
+    """The first byte says where the parameters begin, the second is the format's number."""
+    content = head.content
+    if len(content) < 2 or content[1] != 0x50 or not 2 <= content[0] < 32:
+        return 0.0
+    return float(len(content) < 4 or b"\0" in content)  # a text may begin with a line break and a P
+
+
+@register_format(
+    "c3d",
+    title="C3D",
+    written_by="Vicon Nexus, Qualisys Track Manager, OptiTrack Motive and most systems of motion capture",
+    endings=(".c3d",),
+    recognise=_certainty,
+)
 def open_c3d(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
     """Open a C3D file; its frames are read when they are asked for.
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
-from signface.takes.formats.table import header_cells
-from signface.takes.formats.text import numbers, read_text
+from signface.takes.formats.registry import FileHead, register_format
+from signface.takes.formats.text import header_cells, numbers, read_text
 
 TIMECODE = re.compile(r"^\s*(\d+):(\d+):(\d+)[:;](\d+)(\.\d+)?\s*$")
 ROTATIONS = ("HeadYaw", "HeadPitch", "HeadRoll")
@@ -76,12 +76,30 @@ def _rotations(angles: np.ndarray) -> np.ndarray:
     return poses
 
 
-def read_livelink(path: str | PathLike[str]) -> Descriptors:
+def _certainty(head: FileHead) -> float:
+    return 0.9 * ([cell.lower() for cell in head.cells[:2]] == ["timecode", "blendshapecount"])
+
+
+@register_format(
+    "livelink",
+    title="Live Link Face CSV",
+    written_by="Live Link Face on an iPhone",
+    endings=(".csv",),
+    recognise=_certainty,
+    holds="weights",
+)
+def read_livelink(path: str | PathLike[str], *, unit: str | None = None) -> Descriptors:
     """Read the weights of a Live Link Face CSV.
 
     Bases get their ARKit names (`eyeBlinkLeft`); `tongueOut` is left out, as in the default face. Frames the phone
     dropped are filled by straight lines between their neighbours, so that the rate is even. Positions of the head are
     not in the file: poses are rotations only.
+
+    Parameters
+    ----------
+    path : path
+    unit : str, optional
+        Not used: weights have no unit of length.
 
     Raises
     ------

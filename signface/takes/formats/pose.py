@@ -7,6 +7,7 @@ of a picture is unknown; it is set once for a take so that the eyes are as far a
 
 from __future__ import annotations
 
+import struct
 import warnings
 from os import PathLike
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from signface.errors import SignfaceError
+from signface.takes.formats.registry import FileHead, register_format
 from signface.takes.take import Take
 
 FACE = "FACE_LANDMARKS"
@@ -83,6 +85,23 @@ def _millimetres_per_pixel(landmarks: np.ndarray, names: list[str]) -> tuple[flo
     raise SignfaceError("the corners of the eyes are never seen, so the scale is unknown")
 
 
+def _certainty(head: FileHead) -> float:
+    """A file begins with the format's version; 0 could be anything."""
+    if len(head.content) < 10:
+        return 0.0
+    (version,) = struct.unpack("<f", head.content[:4])
+    if round(version, 3) in (0.1, 0.2):
+        return 0.9
+    return 0.5 * (version == 0 and head.path.suffix.lower() == ".pose")
+
+
+@register_format(
+    "pose",
+    title=".pose",
+    written_by="pose-format, from MediaPipe Holistic",
+    endings=(".pose",),
+    recognise=_certainty,
+)
 def read_pose(path: str | PathLike[str], *, unit: str | None = None) -> Take:
     """Read the face landmarks of a `.pose` file as a take; labels are the landmarks' indices ("33", "263").
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from signface.errors import SignfaceError
+from signface.takes.formats.registry import FileHead, register_format
 from signface.takes.formats.text import TextFile, TextRows, marker_rows
 from signface.takes.labels import clean_labels
 from signface.takes.recording import TakeFile
@@ -39,6 +40,17 @@ def _header(lines: list[str]) -> tuple[dict[str, list[str]], int]:
     return fields, len(lines)
 
 
+def _certainty(head: FileHead) -> float:
+    return 0.95 * any(line.startswith(("NO_OF_MARKERS\t", "MARKER_NAMES\t")) for line in head.lines[:40])
+
+
+@register_format(
+    "qtm",
+    title="Qualisys TSV",
+    written_by="Qualisys Track Manager",
+    endings=(".tsv",),
+    recognise=_certainty,
+)
 def open_qtm(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
     """Open a TSV file of Qualisys Track Manager with 3-D data and its header; frames are read when asked for.
 

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import csv
 from os import PathLike
 from pathlib import Path
 
@@ -13,18 +12,13 @@ import numpy as np
 
 from signface.errors import SignfaceError
 from signface.files import whole_file
-from signface.takes.formats.text import TextFile, TextRows, even_rate, marker_rows
+from signface.takes.formats.registry import FileHead, register_format
+from signface.takes.formats.text import TextFile, TextRows, even_rate, header_cells, marker_rows
 from signface.takes.labels import clean_labels
 from signface.takes.recording import TakeFile
 from signface.takes.take import Take
 
 AXES = ("x", "y", "z")
-
-
-def header_cells(line: str) -> tuple[list[str], str]:
-    """The cells of a header line and the separator that it uses (`,`, `;` or tab)."""
-    separator = max((",", ";", "\t"), key=line.count)
-    return [cell.strip() for cell in next(csv.reader(line.splitlines(), delimiter=separator), [])], separator
 
 
 def _markers(columns: list[str], file: Path) -> tuple[list[str], np.ndarray]:
@@ -52,6 +46,18 @@ def _markers(columns: list[str], file: Path) -> tuple[list[str], np.ndarray]:
     return [label for label, _ in order], np.array([own for _, own in order])
 
 
+def _certainty(head: FileHead) -> float:
+    coordinates = [cell.lower().rpartition("_")[2] in AXES for cell in head.cells[1:4]]
+    return 0.7 * (len(coordinates) == 3 and all(coordinates))
+
+
+@register_format(
+    "table",
+    title="CSV of markers",
+    written_by="signface, scripts and spreadsheets: time_s, then LABEL_x, LABEL_y, LABEL_z",
+    endings=(".csv",),
+    recognise=_certainty,
+)
 def open_table(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
     """Open a wide CSV (separated by commas, semicolons or tabs): `time_s`, then three columns a marker.
 

@@ -1,5 +1,6 @@
 """Text files of numbers, as the readers of TRC, TSV and CSV share them.
 
+- `header_cells`: a header line's cells, and what separates them.
 - `read_text`: a file's text, whatever its encoding.
 - `TextFile`, `TextRows`: a file whose lines, or rows of numbers, are read in pieces.
 - `numbers`: cells to a table of floats, quickly, with the line named that does not fit.
@@ -9,6 +10,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 from collections.abc import Sequence
 from functools import partial
@@ -26,6 +28,18 @@ BLOCK, ROWS = 1 << 20, 16384
 
 #: What a blank line consists of: the signs up to the space.
 BLANK = "".join(map(chr, range(33)))
+
+
+def header_cells(line: str) -> tuple[list[str], str]:
+    """The cells of a header line and the separator that it uses (`,`, `;` or tab).
+
+    Examples
+    --------
+    >>> header_cells("time_s; LBRO_x; LBRO_y")
+    (['time_s', 'LBRO_x', 'LBRO_y'], ';')
+    """
+    separator = max((",", ";", "\t"), key=line.count)
+    return [cell.strip() for cell in next(csv.reader(line.splitlines(), delimiter=separator), [])], separator
 
 
 def read_text(file: Path) -> str:

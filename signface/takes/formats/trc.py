@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from signface.errors import SignfaceError
+from signface.takes.formats.registry import register_format
 from signface.takes.formats.text import TextFile, TextRows, even_rate, marker_rows
 from signface.takes.labels import clean_labels
 from signface.takes.recording import TakeFile
@@ -26,6 +27,13 @@ def _float(word: str) -> float:
         return math.nan
 
 
+@register_format(
+    "trc",
+    title="TRC",
+    written_by="Cortex, OpenSim, OptiTrack Motive",
+    endings=(".trc",),
+    recognise=lambda head: head.text.startswith("PathFileType"),
+)
 def open_trc(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
     """Open a TRC file; its frames are read when they are asked for.
 
