@@ -12,8 +12,8 @@ import os
 import sys
 from collections.abc import Sequence
 
+from signface.compiling import on_compiling
 from signface.errors import SignfaceError
-from signface.solver.compiling import on_compiling
 
 #: command: what it does, in a line. The module has the same name.
 COMMANDS = {
@@ -91,7 +91,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _say_why_it_takes_long(once: bool) -> None:
     often = "once" if once else "every time, as no folder can be written to keep it in: set NUMBA_CACHE_DIR to one"
-    print(f"signface: preparing the solver for this machine, {often} (a few seconds)", file=sys.stderr, flush=True)
+    print(f"signface: preparing its loops for this machine, {often} (a few seconds)", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

@@ -14,9 +14,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from signface.errors import SignfaceError
+from signface.face.camera import face_camera
 from signface.face.model import FaceModel
 from signface.placement.empirical import find_landmarks
-from signface.render.still import face_camera, fragments, whole_mesh
+from signface.render.raster import visible_triangles
+from signface.render.still import whole_mesh
 
 #: Zones where no marker holds, and how far around their lines (mm).
 ZONES = {
@@ -269,9 +271,9 @@ def seen_skin(face: FaceModel) -> np.ndarray:
     mesh, _ = whole_mesh(face)
     for yaw, pitch in ((0.0, 0.0), (-60.0, 0.0), (60.0, 0.0), (0.0, -25.0)):
         camera = face_camera(face, yaw=yaw, pitch=pitch, size=_VIEW, margin=1.1)
-        _, triangles, _ = fragments(camera.project(mesh.vertices)[mesh.triangles], *_VIEW)
-        corners = mesh.triangles[np.unique(triangles)]
-        facing = mesh.triangle_normals[np.unique(triangles)] @ camera.axes[2] > 0.0
+        triangles = visible_triangles(mesh, camera)
+        corners = mesh.triangles[triangles]
+        facing = mesh.triangle_normals[triangles] @ camera.axes[2] > 0.0
         corners = corners[facing].ravel()
         seen[corners[corners < len(seen)]] = True
     return seen

@@ -23,12 +23,13 @@ import numpy as np
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
+from signface.face.camera import Camera
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.face.reading import read_parts
 from signface.files import whole_file
 from signface.render.raster import Scene, Style
-from signface.render.still import Camera, whole_mesh
+from signface.render.still import whole_mesh
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")

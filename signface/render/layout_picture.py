@@ -6,10 +6,11 @@ from os import PathLike
 
 import numpy as np
 
+from signface.face.camera import Camera
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.files import whole_file
-from signface.render.still import Camera, render, whole_mesh
+from signface.render.still import render, whole_mesh
 
 #: Title of each view and its yaw in degrees.
 VIEWS = (("signer's right", -75.0), ("front", 0.0), ("signer's left", 75.0))

@@ -12,10 +12,11 @@ from os import PathLike
 import numpy as np
 import pandas as pd
 
+from signface.face.camera import Camera
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.files import whole_file
-from signface.render.still import Camera, render, whole_mesh
+from signface.render.still import render, whole_mesh
 
 #: Title of each view, its yaw in degrees, and its place on the page (left, bottom, width, height).
 VIEWS = (
@@ -90,7 +91,7 @@ def draw_sheet(face: FaceModel, layout: MarkerLayout, *paths: str | PathLike[str
             axes = figure.add_axes(place)
             size = (_PIXELS, round(_PIXELS * place[3] * 8.27 / (place[2] * 11.69)))
             camera = _camera(layout.points(face), yaw, size)
-            axes.imshow(render(mesh, camera, pale, samples=1), interpolation="antialiased")
+            axes.imshow(render(mesh, camera, pale), interpolation="antialiased")
             axes.set(xlim=(0, size[0]), ylim=(size[1], 0))
             axes.set_title(title, fontsize=10)
             axes.axis("off")

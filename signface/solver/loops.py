@@ -25,13 +25,9 @@ entries. Each matrix is padded with weights that nothing moves, so that its rows
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import exp, inf, isfinite, log1p, sqrt
 
-import numba
-from numba.core import event
-
-from signface.solver import compiling
+from signface.compiling import compiled
 
 #: Steps after which a frame is left to the damped method.
 QUICK_STEPS = 60
@@ -47,44 +43,11 @@ RENEW = 256
 CANCELLED = 1e-4
 #: Up to so many smoothings outside 0 to 1 the exponential is summed as a series, without a call.
 NEAR = 0.25
+#: Sums may be reordered and fused; NaN and infinity keep their meaning.
+_FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
 
 
-#: The loops for which there is no folder to keep them in.
-_unkept: list[str] = []
-
-
-def _compiled(function: Callable) -> Callable:
-    """The function compiled at its first call, without the interpreter's lock, and kept on disk for the next process.
-
-    Numba keeps it beside this file, or in the user's cache folder where that is read-only. Where neither can be
-    written, every process compiles for itself.
-    """
-    make = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
-    made = make(function)
-    try:
-        made.enable_caching()
-    except RuntimeError:
-        _unkept.append(function.__name__)
-    except AttributeError:  # NUMBA_DISABLE_JIT is set: there is nothing to keep
-        pass
-    return made
-
-
-class _Teller(event.Listener):
-    """Says that the loops are about to be compiled (`signface.solver.compiling`)."""
-
-    def on_start(self, event: event.Event) -> None:
-        if event.data["dispatcher"].py_func.__module__ == __name__:
-            compiling.tell(once=not _unkept)
-
-    def on_end(self, event: event.Event) -> None:
-        """Nothing is said of the end."""
-
-
-event.register("numba:compile", _Teller())
-
-
-@_compiled
+@compiled(fastmath=_FASTMATH)
 def products(rows, matrix, out):
     """`out[f, i] = rows[f] . matrix[i]`, four rows by two at a time."""
     for f0 in range(0, len(rows), 4):
@@ -105,7 +68,7 @@ def products(rows, matrix, out):
             out[f2, i], out[f2, i + 1], out[f3, i], out[f3, i + 1] = s20, s21, s30, s31
 
 
-@_compiled
+@compiled(fastmath=_FASTMATH)
 def _combine(matrix, factors, which, some, out):
     """`out`, the sum of `factors[i] * matrix[i]` over the first `some` entries `i` of `which`."""
     for i in range(len(out)):
@@ -125,7 +88,7 @@ def _combine(matrix, factors, which, some, out):
         k += 1
 
 
-@_compiled
+@compiled(fastmath=_FASTMATH)
 def _correct(inverse, i, change, row):
     """Make `inverse` that of a matrix whose entry (i, i) is greater by `change`; `row` is room to work in."""
     for j in range(len(row)):
@@ -137,7 +100,7 @@ def _correct(inverse, i, change, row):
             inverse[j, k] -= part * row[k]
 
 
-@_compiled
+@compiled(fastmath=_FASTMATH)
 def follow(
     right, quad, free, stiffness, smoothing, pull, knee, tolerance, inverse, state, which, age, solved, steps
 ):  # fmt: skip
@@ -299,7 +262,7 @@ def follow(
     return age
 
 
-@_compiled
+@compiled(fastmath=_FASTMATH)
 def finish(rows, placed, solved, places, count, weights, residual, farthest):
     """Put weights in their places and measure how far they leave the markers: in root mean square, and at most."""
     for frame in range(len(rows)):

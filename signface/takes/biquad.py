@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from signface.compiling import compiled
 
-@numba.njit(cache=True, nogil=True)
+
+@compiled()
 def forward_and_backward(signals, b, a, rest):
     """Filter (n, K) signals in place along the first axis, forward and then backward.
 

@@ -6,16 +6,18 @@ import struct
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from signface.descriptors import Descriptors, write_weights
 from signface.errors import SignfaceError
+from signface.face.camera import Camera
 from signface.face.mesh import Mesh
 from signface.render.film import Avatar, at_rate, beside, film_camera, in_order, pictures_of, read_film, write_film
-from signface.render.raster import Scene, Style
+from signface.render.raster import Scene, Style, visible_triangles
 from signface.render.sheet import make_sheet
-from signface.render.still import Camera, render
+from signface.render.still import render
 
-pytest.importorskip("numba", reason="needs the extra render")
 pytest.importorskip("imageio_ffmpeg", reason="needs the extra render")
 
 SIZE = (128, 96)
@@ -82,13 +84,47 @@ def test_only_what_a_base_moves_changes_in_the_picture(avatar, face):
     assert rows.min() > 0.35 * SIZE[1]  # the jaw moves the lower face
 
 
-def test_the_compiled_z_buffer_covers_the_same_pixels_as_the_plain_one(face):
-    camera = film_camera(face, (96, 96), yaw=20)
+def covering(corners, points):
+    """(T, P) bool: which (T, 3, 2) triangles hold which (P, 2) points, by the signs of the three areas."""
+    areas = []
+    for k in range(3):
+        (ax, ay), (bx, by) = corners[:, k].T[:, :, None], corners[:, (k + 1) % 3].T[:, :, None]
+        areas.append((bx - ax) * (points[:, 1] - ay) - (points[:, 0] - ax) * (by - ay))
+    return np.all([area >= 0 for area in areas], axis=0) | np.all([area <= 0 for area in areas], axis=0)
+
+
+def centres(width, height):
+    row, column = np.mgrid[:height, :width] + 0.5
+    return np.stack([column.ravel(), row.ravel()], axis=1)
+
+
+def test_a_pixel_is_covered_when_its_centre_lies_in_a_triangle(face):
+    camera = film_camera(face, (48, 48), yaw=20)
     red = np.tile((1.0, 0.1, 0.1), (len(face.mesh.vertices), 1))
-    fast = Scene(face.mesh.triangles, red, camera, Style(background=(0, 0, 1))).draw(face.mesh.vertices)
-    plain = render(face.mesh, camera, red)
-    covered = fast[..., 2] < 0.55 * 255
-    assert (covered == (plain[..., 2] < 0.55)).mean() > 0.995
+    style = Style(background=(0, 0, 1), samples=1)
+    covered = Scene(face.mesh.triangles, red, camera, style).draw(face.mesh.vertices)[..., 2] < 0.55 * 255
+    corners = camera.project(face.mesh.vertices)[face.mesh.triangles][:, :, :2]
+    held = np.any([covering(part, centres(48, 48)).any(axis=0) for part in np.array_split(corners, 200)], axis=0)
+    assert (covered.ravel() == held).mean() > 0.995
+    white = render(face.mesh, camera, red, samples=1)
+    assert (covered == (white[..., 2] < 0.55 * 255)).mean() > 0.995
+
+
+@given(st.integers(0, 10**6))
+@settings(deadline=None, max_examples=40)
+def test_the_nearest_triangle_is_the_visible_one(seed):
+    rng = np.random.default_rng(seed)
+    mesh = Mesh(rng.uniform(-1, 1, (30, 3)), np.arange(30).reshape(10, 3))
+    camera = Camera(np.zeros(3), 1.6, yaw=float(rng.uniform(0, 360)), size=(31, 23))
+    corners = camera.project(mesh.vertices)[mesh.triangles]
+    points = centres(31, 23)
+    held = covering(corners[:, :, :2], points)
+    depth = np.full(held.shape, -np.inf)
+    for number, triangle in enumerate(corners):
+        plane = np.linalg.solve(np.column_stack([triangle[:, :2], np.ones(3)]), triangle[:, 2])
+        depth[number, held[number]] = points[held[number]] @ plane[:2] + plane[2]
+    nearest = np.unique(depth.argmax(axis=0)[held.any(axis=0)])
+    assert np.array_equal(visible_triangles(mesh, camera), nearest)
 
 
 def test_what_is_nearer_hides_what_is_behind():

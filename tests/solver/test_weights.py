@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from signface.compiling import on_compiling, tell
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.layout_files import read_layout
@@ -17,7 +18,6 @@ from signface.face.model import FaceModel
 from signface.face.reading import read_face
 from signface.face.subdivision import subdivide
 from signface.solver.bounds import AT_REST, SMOOTHING, holding_curvature, holding_energy, holding_slope, released
-from signface.solver.compiling import on_compiling, tell
 from signface.solver.methods import METHODS, make_solver
 from signface.solver.newton import Problem, minimise, minimise_damped
 from signface.solver.thin_shell import ThinShellSolver

@@ -16,8 +16,6 @@ from signface.study.examples import copy_example
 from signface.study.films.stimuli import parse_method, plan_films, read_excerpts
 from tests.fixtures.study_site import SMALL
 
-pytest.importorskip("numba", reason="needs the extra render")
-
 RENDER = """
 [render]
 rate = 10

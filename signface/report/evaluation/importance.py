@@ -88,7 +88,8 @@ def _paint(figure, face: FaceModel, values: np.ndarray) -> None:  # type: ignore
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LinearSegmentedColormap
 
-    from signface.render.still import face_camera, render
+    from signface.face.camera import face_camera
+    from signface.render.still import render
 
     scale = LinearSegmentedColormap.from_list(
         "importance", [(STILL, STILL, STILL), *colormaps["Blues"]([0.45, 0.75, 1.0])]

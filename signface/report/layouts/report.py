@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from signface.face.camera import face_camera
 from signface.face.model import FaceModel
-from signface.render.still import face_camera, render
+from signface.render.still import render
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
