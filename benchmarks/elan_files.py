@@ -13,8 +13,8 @@ from pathlib import Path
 import pandas as pd
 import pympi
 
-from signface.elan.export import write_eaf, write_into
 from signface.elan.reference import read_reference
+from signface.elan.writing import write_eaf
 from signface.segmentation.segments import Segments
 
 COUNT = 5000
@@ -51,8 +51,8 @@ def main() -> None:
         file, other = Path(folder) / "ours.eaf", Path(folder) / "pympi.eaf"
         rival = seconds(lambda: by_pympi(other))
         figures = {
-            "write": seconds(lambda: write_eaf(file, many, signer="S1")),
-            "add a signer's tiers to it": seconds(lambda: write_into(file, few, signer="S2")),
+            "write": seconds(lambda: write_eaf(many, file, signer="S1")),
+            "add a signer's tiers to it": seconds(lambda: write_eaf(few, into=file, signer="S2")),
             "read": seconds(lambda: read_reference(file, "S1")),
         }
     print(f"{COUNT} annotations; pympi writes them in {rival:.2f} s")

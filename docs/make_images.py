@@ -20,7 +20,7 @@ def main() -> None:
     """Draw `images/overview.png` from a bundled synthetic take."""
     entry = next(entry for entry in read_corpus(ROOT / "corpora" / "mini").takes if entry.kind == "SE")
     face = read_face("default")
-    found = annotate(read_recording(entry.path), model=load_model("default"), face=face, neutral=entry.neutral_s)
+    found = annotate(read_recording(entry.path), load_model("default"), face=face, neutral=entry.neutral_s)
     figure = draw_overview(
         found.descriptors,
         found.segments,

@@ -27,12 +27,12 @@
 `load_model`                A trained classifier: one that ships, or a file
 `label_segments`            The labels of segments, each with a confidence
 `annotate`                  A recording to labelled segments: all of the above at once
-`summarise`                 What was found, in a line
 =========================== ==============================================================================
 
 **Write**
 
 =========================== ==============================================================================
+`write_eaf`                 An annotation for ELAN, with its curves
 `write_weights`             Weights to csv or Parquet
 `write_segments`            Segments to csv
 =========================== ==============================================================================

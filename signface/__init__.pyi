@@ -1,10 +1,11 @@
 from . import datasets
-from .annotation import Annotation, annotate, summarise
+from .annotation import Annotation, annotate
 from .corpus.manifest import Corpus, read_corpus
 from .corpus.running import run_corpus
 from .descriptors import Descriptors, read_weights, write_weights
 from .elan.options import EafOptions
 from .elan.reference import read_reference, read_tiers
+from .elan.writing import write_eaf
 from .errors import SignfaceError, SignfaceWarning
 from .evaluation.protocol import folds_of
 from .face.layout import MarkerLayout
@@ -71,7 +72,7 @@ __all__ = [
     "run_corpus",
     "save_model",
     "segment",
-    "summarise",
+    "write_eaf",
     "write_segments",
     "write_weights",
 ]

@@ -1,63 +1,163 @@
-"""The main job as one function: a recording in, labelled segments out, and an ELAN file on request.
+"""The main job as one function: a recording in, everything that is found in it out.
 
-- `annotate`: recording to `Annotation` (descriptors, labelled segments, which model).
-- `describe`, `describe_pieces`: its first half, recording to descriptors.
-- `write_annotation`: an `Annotation` to `TAKE.eaf`, with its curves beside it.
-- `summarise`: what was found, in plain words.
+- `annotate`: recording to `Annotation`.
+- `Annotation`: descriptors, labelled segments, channels, curves, and what found them.
+- `describe`, `describe_pieces`: the first half, recording to descriptors.
 
-The steps themselves live in their rooms; this module only puts them in a row.
+The steps themselves live in their rooms; this module only puts them in a row. `signface.elan.writing.write_eaf` writes
+an annotation for ELAN.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from signface.descriptors import Descriptors
+from signface.signer import Signer
 
 if TYPE_CHECKING:
+    import pandas as pd
+    from pympi.Elan import Eaf
+
+    from signface.channels.events import ChannelEvents
+    from signface.elan.options import EafOptions
     from signface.face.layout import MarkerLayout
     from signface.face.model import FaceModel
-    from signface.label.model import TrainedModel
+    from signface.label.model import Card, TrainedModel
     from signface.segmentation.segments import Segments
-    from signface.signer import SignerLevel
     from signface.takes.recording import Recording
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Annotation:
-    """What was found in one recording.
+    """Everything that was found in one take. `print` says it in plain words, on one line.
 
     Parameters
     ----------
     descriptors : Descriptors
         Blendshape weights, residual and head motion.
     segments : Segments
-        Stable segments and transitions with `label` and `confidence`.
-    classifier : str
+        Stable segments and transitions with `label` and `confidence`, and `intensity` where it was sought.
+    model : str
         Name of the trained model that gave the labels.
+    channels : mapping of str to ChannelEvents, optional
+        Events of the further channels (brows, eyes, head, ...), by name; None where they were not sought.
+    signer : Signer
+        Whose take it is.
+    card : Card, optional
+        What the model is and where it comes from.
+
+    See Also
+    --------
+    signface.elan.writing.write_eaf : writes all of it for ELAN.
+
+    Examples
+    --------
+    >>> from signface.files import bundled_corpus
+    >>> from signface.label.persistence import load_model
+    >>> from signface.takes.reading import read_take
+    >>> annotation = annotate(read_take(bundled_corpus() / "M1_IE_J.c3d"), load_model("default"), channels=True)
+    >>> annotation
+    <Annotation of M1_IE_J: 3 stable segments, 8 channels, by default>
+    >>> annotation.channels["head"].table["value"].tolist()
+    []
+    >>> annotation.curves.columns[:3].tolist()
+    ['time_s', 'velocity_energy', 'acceleration_energy']
     """
 
     descriptors: Descriptors
     segments: Segments
-    classifier: str
+    model: str
+    channels: Mapping[str, ChannelEvents] | None = None
+    signer: Signer = field(default_factory=Signer)
+    card: Card | None = None
+
+    @property
+    def name(self) -> str:
+        """The take's name."""
+        return self.descriptors.name
+
+    @cached_property
+    def curves(self) -> pd.DataFrame:
+        """Energies, confidence, some weights and the residual, every 10 ms (`segmentation.curves.curves_table`).
+
+        Raises
+        ------
+        SignfaceError
+            The take has fewer than three frames or ends before time 0.
+        """
+        from signface.segmentation.curves import curves_table
+
+        return curves_table(self.descriptors, self.segments)
+
+    @property
+    def residual_mm(self) -> float | None:
+        """Median over the frames of the solve's residual in millimetres; None where there was nothing to solve."""
+        assert self.descriptors.residual is not None
+        return median_known(self.descriptors.residual)
+
+    @property
+    def facts(self) -> dict[str, str]:
+        """What the header of an EAF says of it: `model`, `take`, `residual_mm`."""
+        residual = self.residual_mm
+        return {
+            "model": self.model,
+            "take": self.name,
+            "residual_mm": "unknown" if residual is None else f"{residual:.2f}",
+        }
+
+    def to_pympi(self, *, options: EafOptions | None = None) -> Eaf:
+        """The tiers as an object of pympi-ling, for scripts (`signface.elan.writing.to_pympi`)."""
+        from signface.elan.writing import to_pympi
+
+        return to_pympi(self, options=options)
+
+    def __repr__(self) -> str:
+        stable = _count((self.segments.table["kind"] == "stable").sum(), "stable segment")
+        channels = "" if self.channels is None else f", {_count(len(self.channels), 'channel')}"
+        return f"<Annotation of {self.name}: {stable}{channels}, by {self.model}>"
+
+    def __str__(self) -> str:
+        from signface.label.vocabulary import AFFECTS
+
+        table = self.segments.table
+        stable = table[table["kind"] == "stable"]
+        seconds = (stable["end_s"] - stable["start_s"]).rename("seconds")
+        parts = []
+        for label, total in seconds.groupby(stable["label"]).sum().sort_values(ascending=False).items():
+            rows = stable["label"] == label
+            confidence = np.average(stable.loc[rows, "confidence"], weights=seconds[rows])
+            parts.append(f"{AFFECTS.get(str(label), str(label))} {total:.1f} s (confidence {confidence:.0%})")
+        residual = self.residual_mm
+        fit = "" if residual is None else f"; the solved face lies {residual:.2f} mm from the markers (median residual)"
+        duration = f"{self.descriptors.duration:.1f} s"
+        return f"{duration}, {_count(len(stable), 'stable segment')}: {', '.join(parts) or 'none'}{fit}"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{self.name}: {self}</p>{self.segments.table.to_html(index=False)}"
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" + ("" if number == 1 else "s")
 
 
 def annotate(
     recording: Recording | Descriptors,
-    *,
     model: TrainedModel,
+    *,
+    signer: Signer | None = None,
+    channels: bool | str | PathLike[str] | Mapping[str, Mapping[str, Any]] = False,
     face: FaceModel | None = None,
     layout: MarkerLayout | None = None,
     neutral: str | float = "auto",
     method: str = "thin-shell",
     alpha: float | None = None,
-    level: SignerLevel | None = None,
     **options: Any,
 ) -> Annotation:
     """Solve, segment and label one recording (Reverdy 2019, chapters 4 and 5).
@@ -68,6 +168,13 @@ def annotate(
         What `signface.takes.reading.open_recording` returns; descriptors (weights from a phone) are not solved.
     model : TrainedModel
         What `signface.label.persistence.load_model` returns.
+    signer : Signer, optional
+        Whose take it is: names the tiers. A model that normalises signers does so by the signer's level, and by this
+        take alone where none is known.
+    channels : bool, path or mapping
+        Also find the further channels and, where the model gives no intensity, the intensity of the affect by its
+        rule: True for the shipped thresholds, or a file of one's own, or what `signface.channels.rules.read_channels`
+        returns.
     face : FaceModel, optional
         The face to solve for; the shipped one by default.
     layout : MarkerLayout, optional
@@ -78,29 +185,43 @@ def annotate(
         One of `signface.solver.methods.METHODS`.
     alpha : float, optional
         Weight of the thin shell, 0 to 1; the method's own default when not given.
-    level : SignerLevel, optional
-        What a model that normalises signers normalises by (`signface.signer.signer_level` of takes of the
-        signer); the level of this take alone when not given.
     **options
         More of `signface.solver.solving.solve_take`.
 
     Raises
     ------
     SignfaceError
-        The recording does not fit the layout, or the model was trained on other bases.
+        The recording does not fit the layout, the model was trained on other bases, or the thresholds are wrong.
+
+    See Also
+    --------
+    signface.elan.writing.write_eaf : writes what was found.
 
     Examples
     --------
+    >>> from signface.files import bundled_corpus
     >>> from signface.label.persistence import load_model
-    >>> from signface.takes.reading import read_recording
-    >>> found = annotate(read_recording("take.c3d"), model=load_model("default"))  # doctest: +SKIP
-    >>> found.segments.table[["start_s", "end_s", "label"]]  # doctest: +SKIP
+    >>> from signface.takes.reading import read_take
+    >>> annotation = annotate(read_take(bundled_corpus() / "M1_IE_J.c3d"), load_model("default"))
+    >>> annotation.segments.table["label"].tolist()[:3]
+    ['N', 'NJ', 'J']
     """
     from signface.label.labelling import find_segments
 
     descriptors = describe(recording, face=face, layout=layout, neutral=neutral, method=method, alpha=alpha, **options)
-    segments = find_segments(descriptors, model, level=level)
-    return Annotation(descriptors, segments, model.name)
+    signer = Signer() if signer is None else signer
+    segments = find_segments(descriptors, model, level=signer.level)
+    events = None
+    if channels is not False:
+        from signface.channels.rules import find_channels, find_intensities, read_channels
+
+        thresholds = (
+            channels if isinstance(channels, Mapping) else read_channels("default" if channels is True else channels)
+        )
+        events = {event.channel: event for event in find_channels(descriptors, thresholds)}
+        if "intensity" in thresholds and "intensity" not in segments.table:
+            segments = find_intensities(descriptors, segments, thresholds)
+    return Annotation(descriptors, segments, model.name, events, signer, model.card)
 
 
 def describe(
@@ -153,80 +274,7 @@ def _face_and_layout(
     return face, choose_layout(recording.labels, face) if layout is None else layout
 
 
-def write_annotation(
-    annotation: Annotation,
-    path: str | PathLike[str],
-    *,
-    properties: Mapping[str, str] | None = None,
-    **options: Any,
-) -> list[Path]:
-    """Write `TAKE.eaf`, its curves and their description for ELAN's timeseries viewer.
-
-    Parameters
-    ----------
-    annotation : Annotation
-    path : path
-        The `.eaf`; `TAKE.curves.csv` and `TAKE_tsconf.xml` appear beside it.
-    properties : mapping, optional
-        What the header of the `.eaf` says besides model, take and residual.
-    **options
-        `signer`, `video`, `channels`, `doubtful_below`, `template`, `into`, `mapping`, `date`, `replace`: see
-        `signface.elan.output.write_take`.
-
-    Returns
-    -------
-    list of Path
-        The files written, the `.eaf` first.
-
-    Raises
-    ------
-    SignfaceError
-        The `.eaf` exists and is not our own untouched output, the mapping does not fit the template, or the folder
-        cannot be written. Nothing is written then.
-    """
-    from signface.elan.output import write_take
-
-    residual = median_residual(annotation.descriptors)
-    told = {
-        "model": annotation.classifier,
-        "take": annotation.descriptors.name,
-        "residual_mm": "unknown" if residual is None else f"{residual:.2f}",
-    }
-    return write_take(
-        path, annotation.descriptors, annotation.segments, properties={**told, **(properties or {})}, **options
-    )
-
-
-def median_residual(descriptors: Descriptors) -> float | None:
-    """Median over the frames of the solve's residual in millimetres; None where there was nothing to solve."""
-    assert descriptors.residual is not None
-    return median_known(descriptors.residual)
-
-
 def median_known(values: np.ndarray) -> float | None:
     """Median of the values that are known; None where none is."""
     known = values[np.isfinite(values)]
     return float(np.median(known)) if known.size else None
-
-
-def summarise(annotation: Annotation) -> str:
-    """What was found in a take, in plain words, on one line.
-
-    Examples
-    --------
-    `4.3 s, 5 stable segments: joy 2.1 s (80 %), neutral 1.4 s (95 %); markers fit the face to 0.9 mm`
-    """
-    from signface.label.vocabulary import AFFECTS
-
-    descriptors, table = annotation.descriptors, annotation.segments.table
-    stable = table[table["kind"] == "stable"]
-    seconds = (stable["end_s"] - stable["start_s"]).rename("seconds")
-    found = []
-    for label, total in seconds.groupby(stable["label"]).sum().sort_values(ascending=False).items():
-        own = stable["label"] == label
-        confidence = np.average(stable.loc[own, "confidence"], weights=seconds[own])
-        found.append(f"{AFFECTS.get(str(label), str(label))} {total:.1f} s (confidence {confidence:.0%})")
-    count = f"{len(stable)} stable segment" + ("" if len(stable) == 1 else "s")
-    residual = median_residual(descriptors)
-    fit = "" if residual is None else f"; the solved face lies {residual:.2f} mm from the markers (median residual)"
-    return f"{descriptors.duration:.1f} s, {count}: {', '.join(found) or 'none'}{fit}"

@@ -73,7 +73,7 @@ def test_python_and_the_command_line_find_the_same(mini, tmp_path):
     from signface.takes.reading import read_recording
 
     take = mini.takes[0].path
-    found = annotate(read_recording(take), model=load_model("default")).segments.table
+    found = annotate(read_recording(take), load_model("default")).segments.table
     assert main(["annotate", str(take), "-o", str(tmp_path / "a.eaf")]) == 0
     written = read_reference(tmp_path / "a.eaf").table
     assert list(written["label"]) == list(found["label"])
@@ -155,7 +155,7 @@ def test_start_of_the_recording_is_honoured(mini, tmp_path):
     from signface.takes.reading import read_take
 
     take, model = read_take(mini.takes[0].path), load_model("default")
-    early = annotate(take, model=model).segments.table
-    late = annotate(dataclasses.replace(take, start=take.start + 12.5), model=model).segments.table
+    early = annotate(take, model).segments.table
+    late = annotate(dataclasses.replace(take, start=take.start + 12.5), model).segments.table
     assert list(late["label"]) == list(early["label"])
     np.testing.assert_allclose(late["start_s"], early["start_s"] + 12.5, atol=1e-6)

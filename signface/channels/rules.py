@@ -1,7 +1,7 @@
 """What the face and the head do besides the affect: brows, eyes, gaze, nose, mouth, cheeks, head.
 
 - `read_channels`: the thresholds, from the shipped file or one's own.
-- `find_channels`: events of every channel of a take.
+- `find_channels`: the events (`events.ChannelEvents`) of every channel of a take.
 - `find_intensities`: the intensity (1 to 3) of each stable segment.
 
 The thresholds stand in `models/channels/default.toml`, with what they mean.
@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from signface.channels.events import ChannelEvents
 from signface.channels.head import head_events
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
@@ -29,27 +29,6 @@ from signface.segmentation.segments import Segments
 #: Keys that a channel's table holds besides its values.
 CHANNEL_KEYS = {"description", "together", "measured_only"}
 VALUE_KEYS = {"description", "bases", "minus", "combine", "on", "off", "min_ms", "max_ms", "gap_ms"}
-
-
-@dataclass(frozen=True)
-class ChannelEvents:
-    """What was found on one channel.
-
-    Parameters
-    ----------
-    channel : str
-    description : str
-    values : mapping of str to str
-        Every value that the channel can hold, with its description: a closed vocabulary.
-    table : DataFrame
-        `start_s, end_s, value`, in order, without overlap; for the head also `cycles` and `amplitude_deg` (missing
-        for postures' cycles).
-    """
-
-    channel: str
-    description: str
-    values: Mapping[str, str]
-    table: pd.DataFrame
 
 
 def read_channels(name: str | PathLike[str] = "default") -> dict[str, dict[str, Any]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import sys
+from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +25,7 @@ from signface.errors import SignfaceError
 if TYPE_CHECKING:
     from signface.annotation import Annotation
     from signface.descriptors import Descriptors
+    from signface.elan.options import EafOptions
     from signface.face.layout import MarkerLayout
     from signface.face.model import FaceModel
     from signface.label.model import TrainedModel
@@ -71,13 +73,13 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.into is not None and arguments.template is not None:
         raise SignfaceError("--into and --template exclude each other", hint="the file of --into has its own tiers")
     files = [arguments.into] if arguments.into is not None else output_files(takes, arguments.output, ".eaf")
-    options = {
-        **writing_options(arguments),
-        "signer": arguments.signer,
-        "video": arguments.video,
-        "into": arguments.into,
-        "replace": arguments.replace,
-    }
+    options = writing_options(arguments)
+    _ = options.rules  # a mapping that is none is said before anything is solved
+    channels: bool | Mapping[str, Any] = False
+    if options.channels is not None:  # pandas comes with it, which is otherwise imported beside the solve
+        from signface.channels.rules import read_channels
+
+        channels = read_channels(options.channels)
     _import_shared()
     failed = 0
     with ThreadPoolExecutor(1) as beside:
@@ -97,6 +99,7 @@ def run(arguments: argparse.Namespace) -> int:
                     file,
                     arguments,
                     options,
+                    channels,
                     face=face,
                     layout=layout,
                     model=model,
@@ -124,7 +127,7 @@ def _import_shared() -> None:
 
 def _load_model(name: str) -> TrainedModel:
     """The classifier, and what labelling and writing import: a second's work, done while the first take is solved."""
-    import signface.elan.output
+    import signface.elan.writing
     import signface.label.labelling  # noqa: F401
     from signface.label.persistence import load_model
 
@@ -158,7 +161,8 @@ def annotate_file(
     take: Path,
     file: Path,
     arguments: argparse.Namespace,
-    options: dict[str, Any],
+    options: EafOptions,
+    channels: bool | Mapping[str, Any],
     *,
     face: FaceModel,
     layout: MarkerLayout | None,
@@ -167,22 +171,26 @@ def annotate_file(
     level: SignerLevel | None = None,
 ) -> None:
     """Annotate one recording into one .eaf and say what was found."""
-    from signface.annotation import annotate, summarise, write_annotation
+    from signface.annotation import annotate
+    from signface.elan.writing import write_eaf
+    from signface.signer import Signer
 
     descriptors = _describe(take, arguments, face, layout) if solved is None else solved
-    found = annotate(descriptors, model=model.result(), level=level)
-    write_annotation(found, file, **options)
+    signer = Signer(arguments.signer, level=level)
+    annotation = annotate(descriptors, model.result(), signer=signer, channels=channels)
+    path, into = (file, None) if arguments.into is None else (None, file)
+    write_eaf(annotation, path, into=into, options=options, video=arguments.video, replace=arguments.replace)
     if arguments.figure:
-        save_picture(found, face, file.with_suffix(".png"))
-    print(f"{file}: {summarise(found)}")
+        save_picture(annotation, face, file.with_suffix(".png"))
+    print(f"{file}: {annotation}")
 
 
-def save_picture(found: Annotation, face: FaceModel, path: Path) -> None:
+def save_picture(annotation: Annotation, face: FaceModel, path: Path) -> None:
     """Draw a take in one picture; its timeline only, where its weights are not this face's."""
     from signface.report.overview import draw_overview
     from signface.report.timeline import draw_timeline, save_figure
 
-    if found.descriptors.names == face.names:
-        save_figure(draw_overview(found.descriptors, found.segments, face), path)
+    if annotation.descriptors.names == face.names:
+        save_figure(draw_overview(annotation.descriptors, annotation.segments, face), path)
     else:
-        save_figure(draw_timeline(found.descriptors, found.segments), path)
+        save_figure(draw_timeline(annotation.descriptors, annotation.segments), path)

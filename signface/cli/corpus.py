@@ -108,7 +108,7 @@ def run_all(arguments: argparse.Namespace) -> int:
         classifier=arguments.classifier,
         workers=arguments.workers,
         scheduler=arguments.scheduler,
-        writing=writing_options(arguments),
+        options=writing_options(arguments),
     )
     count = dict.fromkeys((DONE, BEFORE, CORRECTED, FAILED), 0)
     solved = 0

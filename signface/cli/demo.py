@@ -19,33 +19,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Annotate the bundled takes into a folder, with a figure of each."""
-    from signface.annotation import annotate, summarise, write_annotation
+    from signface.annotation import annotate
     from signface.cli.annotate import save_picture
     from signface.cli.progress import progress
     from signface.corpus.manifest import read_corpus
+    from signface.elan.writing import write_eaf
     from signface.face.reading import read_face
     from signface.files import bundled_corpus
     from signface.label.persistence import load_model
+    from signface.signer import Signer
     from signface.takes.reading import read_recording
 
     corpus = read_corpus(bundled_corpus())
     model, face = load_model("default", quickly=True), read_face("default")
-    found = []
+    results = []
     for entry in progress(corpus.takes, "annotating"):
         file = arguments.output / f"{entry.path.stem}.eaf"
         annotation = annotate(
             read_recording(entry.path),
-            model=model,
+            model,
+            signer=Signer(entry.signer),
             face=face,
             neutral="auto" if entry.neutral_s is None else entry.neutral_s,
         )
-        written = write_annotation(annotation, file, signer=entry.signer, replace=True)
+        written = write_eaf(annotation, file, replace=True)
         save_picture(annotation, face, file.with_suffix(".png"))
-        found.append((written[0], annotation))
-    if not found:
+        results.append((written[0], annotation))
+    if not results:
         raise SignfaceError("no take ships with this copy of signface", hint="use a checkout of the project")
     print("\nThe bundled takes are synthetic: no person was recorded. What signface found in them:\n")
-    for file, annotation in found:
-        print(f"  {file}\n      {summarise(annotation)}")
+    for file, annotation in results:
+        print(f"  {file}\n      {annotation}")
     print(f"\nOpen one of the .eaf files above in ELAN, or look at the pictures: {arguments.output}/*.png")
     return 0

@@ -344,6 +344,7 @@ def _recognise(xml: bytes) -> None:
     from signface.face.layout_files import read_layout
     from signface.face.reading import read_face
     from signface.label.persistence import load_model
+    from signface.signer import Signer
     from signface.takes.reading import read_recording
 
     chosen = read_parameters(xml)
@@ -360,10 +361,9 @@ def _recognise(xml: bytes) -> None:
     layout = read_layout(chosen["layout"], face) if "layout" in chosen else None
     model = load_model(chosen.get("classifier", "default"), quickly=True)
     print(progress_line(0.2, "solving"), flush=True)
-    found = annotate(recording, model=model, face=face, layout=layout, neutral=neutral)
+    signer = Signer(chosen.get("signer", ""))
+    annotation = annotate(recording, model, signer=signer, face=face, layout=layout, neutral=neutral)
     print(progress_line(0.9, "writing"), flush=True)
-    tier = affect_tier(found.segments, chosen.get("signer", ""))
+    tier = affect_tier(annotation.segments, annotation.signer.name)
     write_tier_file(chosen["tiers"], tier, with_dependents=("affect-confidence",))
-    from signface.annotation import summarise
-
-    print(f"INFO: {summarise(found)}", flush=True)
+    print(f"INFO: {annotation}", flush=True)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from signface.errors import SignfaceError
 
 if TYPE_CHECKING:
+    from signface.elan.options import EafOptions
     from signface.face.layout import MarkerLayout
     from signface.face.model import FaceModel
 
@@ -93,31 +94,11 @@ def add_writing_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def writing_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """What `signface.elan.output.write_take` is told of `add_writing_arguments`.
+def writing_options(arguments: argparse.Namespace) -> EafOptions:
+    """What `add_writing_arguments` asked for."""
+    from signface.elan.options import EafOptions
 
-    Raises
-    ------
-    SignfaceError
-        A file is missing or broken, or the confidence is none.
-    """
-    if arguments.doubtful is not None and not 0 <= arguments.doubtful <= 1:
-        raise SignfaceError(f"--doubtful is a confidence from 0 to 1, not {arguments.doubtful:g}")
-    channels = mapping = None
-    if arguments.channels is not None:  # pandas comes with it, which is otherwise imported beside the solve
-        from signface.channels.rules import read_channels
-
-        channels = read_channels(arguments.channels)
-    if arguments.mapping is not None:
-        from signface.elan.mapping import read_mapping
-
-        mapping = read_mapping(arguments.mapping)
-    return {
-        "channels": channels,
-        "doubtful_below": arguments.doubtful,
-        "template": arguments.template,
-        "mapping": mapping,
-    }
+    return EafOptions(arguments.template, arguments.mapping, arguments.channels, arguments.doubtful)
 
 
 def solve_options(arguments: argparse.Namespace) -> dict[str, Any]:

@@ -20,12 +20,13 @@ import re
 import socket
 import time
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from signface.channels.rules import read_channels
 from signface.corpus.cluster import WorkerDied, on_cluster, on_cores
 from signface.corpus.describing import recipe_of, stored_or_solved
 from signface.corpus.manifest import Corpus, TakeEntry
@@ -39,6 +40,7 @@ from signface.corpus.origin import (
     take_name,
 )
 from signface.corpus.store import DescriptorStore
+from signface.elan.options import EafOptions
 from signface.errors import SignfaceError
 from signface.files import whole_file
 
@@ -78,10 +80,10 @@ class Job:
         SHA-256 of the classifier's file.
     code : str
         SHA-256 of the modules between descriptors and annotation.
-    writing : mapping
-        What `signface.elan.output.write_take` is told: `channels`, `doubtful_below`, `template`, `mapping`.
-    written : str
-        SHA-256 of all of that, the content of the template included.
+    options : EafOptions
+        How it is written, with absolute paths.
+    options_digest : str
+        Their SHA-256, the content of their files included.
     """
 
     entry: TakeEntry
@@ -91,8 +93,8 @@ class Job:
     classifier: str
     model: str
     code: str
-    writing: Mapping[str, Any]
-    written: str
+    options: EafOptions
+    options_digest: str
 
     @property
     def take(self) -> str:
@@ -145,7 +147,7 @@ def run_corpus(
     classifier: str = "default",
     workers: int | None = None,
     scheduler: str | None = None,
-    writing: Mapping[str, Any] | None = None,
+    options: EafOptions | None = None,
 ) -> Iterator[Outcome]:
     """Solve and annotate every take of a corpus; what is there already is not done again.
 
@@ -160,8 +162,8 @@ def run_corpus(
         Takes at a time on this machine; as many as it has cores by default.
     scheduler : str, optional
         Address of a Dask cluster to run on instead. Its machines see the corpus under the same path.
-    writing : mapping, optional
-        `channels`, `doubtful_below`, `template` and `mapping` of `signface.elan.output.write_take`.
+    options : EafOptions, optional
+        Which channels are sought, and how files are written.
 
     Yields
     ------
@@ -187,7 +189,7 @@ def run_corpus(
     output = folder / ANNOTATED if output is None else Path(os.path.abspath(output))
     store = DescriptorStore(folder)  # says at once when a newer signface wrote it
     recipe = make_recipe(face, layout, method=method, alpha=alpha)
-    jobs, failed = plan_jobs(corpus, output, recipe, classifier=classifier, writing=writing)
+    jobs, failed = plan_jobs(corpus, output, recipe, classifier=classifier, options=options)
     with only_run_in(output):
         yield from failed
         if scheduler is None:
@@ -205,16 +207,21 @@ def run_corpus(
 
 
 def plan_jobs(
-    corpus: Corpus, output: Path, recipe: Recipe, *, classifier: str, writing: Mapping[str, Any] | None = None
+    corpus: Corpus, output: Path, recipe: Recipe, *, classifier: str, options: EafOptions | None = None
 ) -> tuple[list[Job], list[Outcome]]:
     """The jobs of a run, with absolute paths, and the takes whose own face or layout is not there.
 
     Raises
     ------
     SignfaceError
-        Two takes would be written to the same file, or there is no such classifier or template.
+        Two takes would be written to the same file, there is no such classifier, or a file
+        of the options is missing or wrong.
     """
-    writing, written = _writing(writing or {})
+    options = (EafOptions() if options is None else options).absolute()
+    _ = options.rules  # a file that is wrong is named before the run
+    if options.channels is not None:
+        read_channels(options.channels)
+    options_digest = options.digest
     model, code = shipped_digest("classifiers", ".skops", classifier), code_digest(*ANNOTATING_CODE)
     folder = Path(os.path.abspath(corpus.folder))
     known: dict[tuple[str, str | None], Recipe] = {}
@@ -233,23 +240,8 @@ def plan_jobs(
         except SignfaceError as error:
             failed.append(Outcome(name, FAILED, message=f"{entry.path}: {error}"))
             continue
-        jobs[name] = Job(_absolute(entry), folder, output, own, classifier, model, code, writing, written)
+        jobs[name] = Job(_absolute(entry), folder, output, own, classifier, model, code, options, options_digest)
     return list(jobs.values()), failed
-
-
-def _writing(options: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
-    """The options with an absolute template, which workers elsewhere find, and the SHA-256 of all they say."""
-    absolute, digest = dict(options), hashlib.sha256()
-    template = options.get("template")
-    if template is not None:
-        absolute["template"] = Path(os.path.abspath(template))
-        try:
-            digest.update(absolute["template"].read_bytes())
-        except OSError as error:
-            raise SignfaceError(f"cannot be read ({error.strerror})", file=template) from error
-    said = {key: value for key, value in options.items() if value is not None and key != "template"}
-    digest.update(repr(sorted(said.items())).encode())
-    return absolute, digest.hexdigest()
 
 
 def annotate_job(job: Job) -> Outcome:
@@ -272,8 +264,9 @@ def annotate_job(job: Job) -> Outcome:
 
 def _annotate(job: Job, notes: list[str]) -> tuple[str, bool, str]:
     """State, whether it was solved, and what was found; `notes` gets what the log should say."""
-    from signface.annotation import annotate, summarise, write_annotation
-    from signface.elan.export import check_writable
+    from signface.annotation import annotate
+    from signface.elan.writing import check_writable, write_eaf
+    from signface.signer import Signer
 
     if (job.recipe.solver, job.code) != (code_digest(*SOLVING_CODE), code_digest(*ANNOTATING_CODE)):
         raise SignfaceError(
@@ -293,19 +286,12 @@ def _annotate(job: Job, notes: list[str]) -> tuple[str, bool, str]:
     except SignfaceError as error:
         _write_log(job, [*notes, str(error), CORRECTED])
         return CORRECTED, solved, f"{job.eaf}: was worked in and stays as it is"
-    annotation = annotate(descriptors, model=_model(job.classifier, job.model))
-    write_annotation(
-        annotation,
-        job.eaf,
-        signer=job.entry.signer,
-        video=job.entry.video,
-        date=DATE,
-        properties={"file": origin.file},
-        **job.writing,
-    )
-    found = summarise(annotation)
-    _write_log(job, [*notes, found, f"written to {job.eaf}", ending])
-    return DONE, solved, found
+    model, signer = _model(job.classifier, job.model), Signer(job.entry.signer)
+    annotation = annotate(descriptors, model, signer=signer, channels=job.options.channels or False)
+    properties = {"file": origin.file}
+    write_eaf(annotation, job.eaf, options=job.options, video=job.entry.video, date=DATE, properties=properties)
+    _write_log(job, [*notes, str(annotation), f"written to {job.eaf}", ending])
+    return DONE, solved, str(annotation)
 
 
 @contextlib.contextmanager
@@ -357,7 +343,7 @@ def _names_of(job: Job) -> list[str]:
 def _annotation_key(job: Job, descriptors: str) -> str:
     """SHA-256 of all that an annotation depends on, from the key of the descriptors."""
     video = "" if job.entry.video is None else os.path.relpath(job.entry.video, job.output)
-    parts = [descriptors, job.model, job.code, job.written, job.entry.signer, video]
+    parts = [descriptors, job.model, job.code, job.options_digest, job.entry.signer, video]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 

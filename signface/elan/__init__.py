@@ -1,8 +1,8 @@
 """ELAN: tiers, vocabularies and linked curves written and read as annotators' files.
 
 Writing
-    `output.write_take` (everything of a take), `export.write_eaf` (a file of our own, or from a template),
-    `export.write_into` (into an annotator's file), `curves.write_curves`, `curves.write_tsconf`
+    `writing.write_eaf` (what was found in a take: a new file, from a template, or into an annotator's file),
+    `options.EafOptions` (how), `writing.to_pympi` (for scripts), `curves.write_curves`, `curves.write_tsconf`
 Reading
     `reference.read_reference`, `reference.read_tiers`, `reference.read_corrections`, `document.read_document`,
     `checking.check_document`

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 import numpy as np
 
-from signface.channels.rules import ChannelEvents
+from signface.channels.events import ChannelEvents
 from signface.elan.tiers import DependentTier, Tier, milliseconds
 from signface.elan.vocabularies import Entry, Vocabulary
 
@@ -22,29 +22,29 @@ COLOURS = (
 )
 
 
-def channel_tiers(channels: Sequence[ChannelEvents], signer: str = "") -> list[Tier]:
+def channel_tiers(channels: Iterable[ChannelEvents], signer: str = "") -> list[Tier]:
     """One tier `CHANNEL@SIGNER` for each channel, with its closed vocabulary.
 
     Cycles and amplitude (degrees) of head movements go to tiers that hang on it: `head-cycles`, `head-amplitude`.
 
     Parameters
     ----------
-    channels : sequence of ChannelEvents
-        What `signface.channels.rules.find_channels` returns.
+    channels : iterable of ChannelEvents
     signer : str
     """
     tiers = []
-    for found in channels:
-        table = found.table[found.table["end_s"] > 0.0005]
+    for channel in channels:
+        table = channel.table[channel.table["end_s"] > 0.0005]
         start_ms, end_ms = milliseconds(table["start_s"].clip(lower=0).to_numpy(float), table["end_s"].to_numpy(float))
         dependents = []
-        for column, channel, digits in (("cycles", "cycles", 1), ("amplitude_deg", "amplitude", 0)):
+        for column, measure, digits in (("cycles", "cycles", 1), ("amplitude_deg", "amplitude", 0)):
             if column in table.columns:
                 numbers = table[column].to_numpy(float)
-                shown = tuple(f"{number:.{digits}f}" if np.isfinite(number) else None for number in numbers)
-                dependents.append(DependentTier(f"{found.channel}-{channel}", shown))
+                texts = tuple(f"{number:.{digits}f}" if np.isfinite(number) else None for number in numbers)
+                dependents.append(DependentTier(f"{channel.channel}-{measure}", texts))
         values = tuple(str(value) for value in table["value"])
-        tiers.append(Tier(found.channel, signer, start_ms, end_ms, values, vocabulary_of(found), tuple(dependents)))
+        vocabulary = vocabulary_of(channel)
+        tiers.append(Tier(channel.channel, signer, start_ms, end_ms, values, vocabulary, tuple(dependents)))
     return tiers
 
 

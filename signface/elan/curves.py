@@ -1,8 +1,8 @@
 """Curves for ELAN's timeseries viewer: `TAKE.curves.csv` and its description `TAKE_tsconf.xml`.
 
-- `curves_table`, `write_curves`: the energies, the confidence, the residual and a handful of weights.
+- `write_curves`: the csv, from the table of `signface.segmentation.curves.curves_table`.
 - `write_tsconf`: names, units, ranges and colours of the curves, in ELAN's own format.
-- `PANELS`: which curves are drawn together (`preferences.write_preferences`).
+- `panels`: which curves are drawn together (`preferences.write_preferences`).
 
 How ELAN reads the csv (`CSVReader` in its sources) decides its form: lines starting with `#` are skipped, any other
 line counts as a sample, so the header starts with `#`. The rate is taken from the first twenty rows, times in whole
@@ -20,15 +20,9 @@ import numpy as np
 import pandas as pd
 from lxml import etree
 
-from signface.descriptors import Descriptors
 from signface.elan.document import iso_date, link_urls, write_document
 from signface.errors import SignfaceError
 from signface.files import whole_file
-from signface.segmentation.energy import energies
-from signface.segmentation.segments import Segments
-
-#: Rows per second of the csv: a whole number of milliseconds apart.
-CURVES_RATE = 100
 
 PROVIDER = "mpi.eudico.client.annotator.timeseries.csv.CSVServiceProvider"
 
@@ -46,8 +40,6 @@ class Curve:
         Which panel of the viewer it belongs to, from 1.
     span : (2,) tuple of float, optional
         Lowest and highest value drawn; found from the values when None.
-    bases : tuple of str
-        The bases whose mean weight it is; empty for what is no weight.
     """
 
     description: str
@@ -55,82 +47,43 @@ class Curve:
     colour: tuple[int, int, int]
     panel: int
     span: tuple[float, float] | None = None
-    bases: tuple[str, ...] = ()
 
 
-#: Column of the csv: how it is drawn. Weights appear where the face has their bases.
+#: The panel of the weights.
+WEIGHTS = 3
+
+#: Column of the csv: how it is drawn.
 CURVES = {
     "velocity_energy": Curve("Sum of the absolute velocities of the weights (eq. 4.4)", "1/s", (0, 158, 115), 1),
     "acceleration_energy": Curve("Sum of the absolute accelerations of the weights (eq. 4.5)", "1/s2", (213, 94, 0), 2),
-    "confidence": Curve("Confidence of the label of the segment", "", (0, 0, 0), 3, (0.0, 1.0)),
-    "brows_up": Curve(
-        "Brows raised", "", (230, 159, 0), 3, (0.0, 1.0), ("browInnerUp", "browOuterUpLeft", "browOuterUpRight")
-    ),
-    "brows_down": Curve("Brows lowered", "", (213, 94, 0), 3, (0.0, 1.0), ("browDownLeft", "browDownRight")),
-    "lids_closed": Curve("Lids closed", "", (86, 180, 233), 3, (0.0, 1.0), ("eyeBlinkLeft", "eyeBlinkRight")),
-    "lip_corners_up": Curve("Lip corners up", "", (0, 114, 178), 3, (0.0, 1.0), ("mouthSmileLeft", "mouthSmileRight")),
-    "lip_corners_down": Curve(
-        "Lip corners down", "", (204, 121, 167), 3, (0.0, 1.0), ("mouthFrownLeft", "mouthFrownRight")
-    ),
-    "jaw_open": Curve("Jaw open", "", (0, 158, 115), 3, (0.0, 1.0), ("jawOpen",)),
+    "confidence": Curve("Confidence of the label of the segment", "", (0, 0, 0), WEIGHTS, (0.0, 1.0)),
+    "brows_up": Curve("Brows raised", "", (230, 159, 0), WEIGHTS, (0.0, 1.0)),
+    "brows_down": Curve("Brows lowered", "", (213, 94, 0), WEIGHTS, (0.0, 1.0)),
+    "lids_closed": Curve("Lids closed", "", (86, 180, 233), WEIGHTS, (0.0, 1.0)),
+    "lip_corners_up": Curve("Lip corners up", "", (0, 114, 178), WEIGHTS, (0.0, 1.0)),
+    "lip_corners_down": Curve("Lip corners down", "", (204, 121, 167), WEIGHTS, (0.0, 1.0)),
+    "jaw_open": Curve("Jaw open", "", (0, 158, 115), WEIGHTS, (0.0, 1.0)),
     "residual_mm": Curve("Distance of the solved face from the markers", "mm", (153, 153, 153), 4),
 }
 
-#: How many weights are drawn for a face whose bases have other names: those that move most.
-OTHER_WEIGHTS = 6
-OTHER_COLOURS = tuple(curve.colour for curve in CURVES.values() if curve.bases)
+#: Colours of the weights of bases that have no curve of their own above.
+OTHER_COLOURS = tuple(curve.colour for name, curve in CURVES.items() if curve.panel == WEIGHTS and name != "confidence")
 
 
-def curves_table(descriptors: Descriptors, segments: Segments) -> pd.DataFrame:
-    """Curves of a take, every 10 ms.
+def write_curves(table: pd.DataFrame, path: str | PathLike[str]) -> None:
+    """Write curves as csv for ELAN. Its header starts with `#`, so the first column reads `#time_s`.
 
     Parameters
     ----------
-    descriptors : Descriptors
-        At least three frames.
-    segments : Segments
-        The confidence of each is drawn over its duration; missing between segments and where there is none.
-
-    Returns
-    -------
-    DataFrame
-        `time_s` (multiples of 0.01 from 0 or the take's start, whichever is later), `velocity_energy`,
-        `acceleration_energy`, `confidence`, a few weights, `residual_mm`.
+    table : DataFrame
+        `time_s` and a column for each curve (`signface.segmentation.curves.curves_table`).
+    path : path
 
     Raises
     ------
     SignfaceError
-        The take has fewer than three frames or ends before time 0.
+        The folder cannot be written.
     """
-    first = max(0, int(np.ceil(descriptors.start * CURVES_RATE - 1e-6)))
-    last = int(np.floor(descriptors.time[-1] * CURVES_RATE + 1e-6))
-    if last < first:
-        raise SignfaceError(f"{descriptors.name}: the take ends before time 0", hint="mend its start_s")
-    time = np.arange(first, last + 1) / CURVES_RATE
-    energy = energies(descriptors)
-    columns = {
-        "time_s": time,
-        "velocity_energy": np.interp(time, energy.time, energy.velocity),
-        "acceleration_energy": np.interp(time, energy.time, energy.acceleration),
-        "confidence": _confidence(time, segments),
-    }
-    for name, bases in _weights_drawn(descriptors).items():
-        mean = np.mean([descriptors.weight(base) for base in bases], axis=0)
-        columns[name] = np.interp(time, descriptors.time, mean)  # NaN stays NaN around a frame without weights
-    assert descriptors.residual is not None
-    columns["residual_mm"] = np.interp(time, descriptors.time, descriptors.residual)
-    return pd.DataFrame(columns)
-
-
-def write_curves(descriptors: Descriptors, segments: Segments, path: str | PathLike[str]) -> None:
-    """Write `curves_table` as csv for ELAN. Its header starts with `#`, so the first column reads `#time_s`.
-
-    Raises
-    ------
-    SignfaceError
-        As `curves_table`, or the folder cannot be written.
-    """
-    table = curves_table(descriptors, segments)
     row = ",".join(["%.4f"] * table.shape[1])  # ten times as fast as pandas, and the same bytes
     rows = "\n".join(row % tuple(values) for values in table.to_numpy(dtype=float).tolist()).replace("nan", "NaN")
     with whole_file(path) as temporary:
@@ -152,7 +105,7 @@ def write_tsconf(
     path : path
         `TAKE_tsconf.xml`; ELAN knows the file by this ending.
     date : datetime or str, optional
-        As in `export.write_eaf`.
+        As in `writing.write_eaf`.
 
     Raises
     ------
@@ -195,41 +148,14 @@ def panels(curves: str | PathLike[str]) -> dict[int, list[str]]:
         names = pd.read_csv(curves, nrows=0).columns[1:]
     except (OSError, ValueError) as error:
         raise SignfaceError("cannot be read as a file of curves", file=curves) from error
-    found: dict[int, list[str]] = {}
+    drawn: dict[int, list[str]] = {}
     for column, name in enumerate(names, start=1):
-        found.setdefault((CURVES.get(name) or _other_curve(name, column)).panel, []).append(name)
-    return dict(sorted(found.items()))
-
-
-def _confidence(time: np.ndarray, segments: Segments) -> np.ndarray:
-    """(K,) confidence of the segment that each time lies in, NaN outside segments."""
-    table = segments.table
-    values = np.full(len(time), np.nan)
-    if "confidence" not in table.columns or not len(table):
-        return values
-    start, end = table["start_s"].to_numpy(float), table["end_s"].to_numpy(float)
-    segment = np.searchsorted(start, time + 1e-9, side="right") - 1
-    inside = (segment >= 0) & (time < end[segment.clip(min=0)] - 1e-9)
-    values[inside] = table["confidence"].to_numpy(float)[segment[inside]]
-    return values
-
-
-def _weights_drawn(descriptors: Descriptors) -> dict[str, tuple[str, ...]]:
-    """Column and the bases it is the mean of: those of `CURVES`, or the bases that move most."""
-    drawn = {}
-    for name, curve in CURVES.items():
-        present = tuple(base for base in curve.bases if base in descriptors.names)
-        if present:
-            drawn[name] = present
-    if drawn:
-        return drawn
-    spread = np.nan_to_num(np.nanstd(descriptors.weights, axis=0))
-    most = sorted(np.argsort(-spread, kind="stable")[:OTHER_WEIGHTS])
-    return {descriptors.names[index]: (descriptors.names[index],) for index in most}
+        drawn.setdefault((CURVES.get(name) or _other_curve(name, column)).panel, []).append(name)
+    return dict(sorted(drawn.items()))
 
 
 def _other_curve(name: str, column: int) -> Curve:
-    return Curve(f"Weight of {name}", "", OTHER_COLOURS[column % len(OTHER_COLOURS)], 3, (0.0, 1.0))
+    return Curve(f"Weight of {name}", "", OTHER_COLOURS[column % len(OTHER_COLOURS)], WEIGHTS, (0.0, 1.0))
 
 
 def _span(values: np.ndarray) -> tuple[float, float]:

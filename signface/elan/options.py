@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
+import os
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from signface.errors import SignfaceError
+from signface.files import shipped
 from signface.settings import Settings, option
+
+if TYPE_CHECKING:
+    from signface.elan.mapping import Mapping
 
 
 @dataclass(frozen=True)
@@ -45,9 +54,59 @@ class EafOptions(Settings):
         kind=float,
         metavar="CONFIDENCE",
     )
+    curves: bool = option(True, help="also write the curves of ELAN's timeseries viewer", kind=bool)
     author: str = option("signface", help="who the file says made it", metavar="NAME")
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.doubtful is not None and not 0 <= self.doubtful <= 1:
             raise SignfaceError(f"doubtful is a confidence from 0 to 1, not {self.doubtful:g}")
+
+    @property
+    def rules(self) -> Mapping:
+        """The rules of the mapping file; none where there is no file.
+
+        Raises
+        ------
+        SignfaceError
+            The file is missing or no mapping.
+        """
+        if self.mapping is None:
+            return {}
+        from signface.elan.mapping import read_mapping
+
+        return read_mapping(self.mapping)
+
+    def absolute(self) -> EafOptions:
+        """The options with absolute paths, for processes that stand in another folder."""
+        shipped_name = self.channels in _thresholds()
+        files = {name: file for name, file in self._files().items() if not (name == "channels" and shipped_name)}
+        return self.changed(**{name: os.path.abspath(file) for name, file in files.items()})
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of all that they decide, with the content of the files in place of their names.
+
+        Raises
+        ------
+        SignfaceError
+            A file cannot be read.
+        """
+        values = self.as_dict()
+        for name, file in self._files().items():
+            try:
+                values[name] = hashlib.sha256(Path(file).read_bytes()).hexdigest()
+            except OSError as error:
+                raise SignfaceError(f"cannot be read ({error.strerror})", file=file) from error
+        return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
+
+    def _files(self) -> dict[str, str]:
+        """The fields that name files, and the files."""
+        channels = None if self.channels is None else str(_thresholds().get(self.channels, self.channels))
+        named = {"template": self.template, "mapping": self.mapping, "channels": channels}
+        return {name: file for name, file in named.items() if file is not None}
+
+
+def _thresholds() -> dict[str, Path]:
+    """Names and files of the shipped thresholds of the further channels."""
+    return shipped("channels", ".toml")

@@ -21,7 +21,7 @@ import numpy as np
 from signface.corpus.manifest import Corpus, TakeEntry, read_corpus, write_takes
 from signface.descriptors import Descriptors, write_weights
 from signface.elan.document import is_unmodified_output, read_document
-from signface.elan.export import write_eaf
+from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.layout_files import read_layout
@@ -262,8 +262,8 @@ def write_take(folder: Path, job: Job, made: SyntheticTake) -> TakeEntry:
         write_c3d(made.take, temporary)
     annotation = annotation_of(folder, job)
     write_eaf(
-        annotation,
         made.reference,
+        annotation,
         signer=job.signer_name,
         date=DATE,
         properties={"take": recording.name, "note": "synthetic: no person is recorded"},

@@ -15,7 +15,7 @@ from signface.cli.main import main
 from signface.corpus.examples import solve_examples
 from signface.corpus.manifest import TakeEntry, read_corpus, write_takes
 from signface.descriptors import write_weights
-from signface.elan.export import write_eaf
+from signface.elan.writing import write_eaf
 from signface.label.labellers import NAMES
 from signface.label.persistence import load_model, read_card
 from signface.segmentation.segments import Segments
@@ -30,7 +30,7 @@ def folder(tmp_path_factory):
     for made in corpus():
         path, annotation = folder / made.signer / f"{made.take}.csv", folder / made.signer / f"{made.take}.eaf"
         write_weights(made.descriptors, path)
-        write_eaf(annotation, made.reference, signer=made.signer)
+        write_eaf(made.reference, annotation, signer=made.signer)
         entries.append(TakeEntry(path, made.signer, made.kind, annotation=annotation))
     write_takes(folder, entries)
     return folder
@@ -157,7 +157,7 @@ def copied(folder, tmp_path):
 def one_class(folder):
     for e in corpus():
         table = e.reference.table[e.reference.table["label"] == "N"].reset_index(drop=True)
-        write_eaf(folder / e.signer / f"{e.take}.eaf", Segments(table), signer=e.signer, replace=True)
+        write_eaf(Segments(table), folder / e.signer / f"{e.take}.eaf", signer=e.signer, replace=True)
 
 
 def untrained_signer(folder):
@@ -167,7 +167,7 @@ def untrained_signer(folder):
 
 def empty_annotation(folder):
     e = corpus()[0]
-    write_eaf(folder / e.signer / f"{e.take}.eaf", Segments(e.reference.table[:0]), signer=e.signer, replace=True)
+    write_eaf(Segments(e.reference.table[:0]), folder / e.signer / f"{e.take}.eaf", signer=e.signer, replace=True)
 
 
 def foreign_labels(folder):

@@ -13,7 +13,7 @@ from signface.corpus.checking import TakeCheck, check_corpus, check_take
 from signface.corpus.manifest import TakeEntry, write_takes
 from signface.corpus.origin import make_recipe
 from signface.descriptors import write_weights
-from signface.elan.export import write_eaf
+from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
 from signface.segmentation.segments import Segments
 from tests.fixtures.hand_made import example
@@ -25,7 +25,7 @@ def joy(tmp_path):
     made = example(["N", "J", "N"], take="joy", signer="S1", kind="EU")
     entry = TakeEntry(tmp_path / "joy.csv", "S1", "EU", annotation=tmp_path / "joy.eaf")
     write_weights(made.descriptors, entry.path)
-    write_eaf(entry.annotation, made.reference, signer="S1")
+    write_eaf(made.reference, entry.annotation, signer="S1")
     return made, entry
 
 
@@ -66,7 +66,7 @@ def test_a_damaged_annotation_and_an_unreadable_recording_are_both_told(joy):
 
 def test_an_annotation_without_the_reference_tier(joy):
     made, entry = joy
-    write_eaf(entry.annotation, made.reference, signer="S2", replace=True)
+    write_eaf(made.reference, entry.annotation, signer="S2", replace=True)
     found = problems(entry, "S1", "S2")
     assert len(found) == 1
     assert "no tier affect@S1 or affect" in found[0]
@@ -74,7 +74,7 @@ def test_an_annotation_without_the_reference_tier(joy):
 
 def test_an_annotation_of_a_signer_whom_the_table_does_not_know(joy):
     made, entry = joy
-    write_eaf(entry.annotation, made.reference, signer="S9", replace=True)
+    write_eaf(made.reference, entry.annotation, signer="S9", replace=True)
     assert any("affect@S9" in problem and "not in takes.csv" in problem for problem in problems(entry, "S1", "S2"))
 
 
@@ -99,13 +99,13 @@ def test_a_frame_or_two_beyond_the_take_is_no_problem(joy):
 
 
 def test_an_annotation_that_covers_a_part_of_its_take(joy):
-    write_eaf(joy[1].annotation, labelled([(0.0, 1.0, "N")]), signer="S1", replace=True)
+    write_eaf(labelled([(0.0, 1.0, "N")]), joy[1].annotation, signer="S1", replace=True)
     (problem,) = problems(joy[1])
     assert "annotates 26% of the take" in problem
 
 
 def test_a_reference_tier_without_annotations(joy):
-    write_eaf(joy[1].annotation, labelled([]), signer="S1", replace=True)
+    write_eaf(labelled([]), joy[1].annotation, signer="S1", replace=True)
     (problem,) = problems(joy[1])
     assert "is empty" in problem
 

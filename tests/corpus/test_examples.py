@@ -8,7 +8,7 @@ import pytest
 from signface.corpus.examples import solve_examples
 from signface.corpus.manifest import Corpus, TakeEntry
 from signface.descriptors import write_weights
-from signface.elan.export import write_eaf
+from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
 from tests.fixtures.hand_made import example
 
@@ -18,7 +18,7 @@ def entry(tmp_path):
     made = example(["N", "J", "N"], take="laugh", signer="S1", kind="EU")
     path, annotation = tmp_path / "S1" / "laugh.csv", tmp_path / "S1" / "laugh.eaf"
     write_weights(made.descriptors, path)
-    write_eaf(annotation, made.reference, signer="S1")
+    write_eaf(made.reference, annotation, signer="S1")
     return made, TakeEntry(path, "S1", "EU", annotation=annotation)
 
 

@@ -24,7 +24,7 @@ from signface.corpus.manifest import Corpus, TakeEntry, read_corpus, write_takes
 from signface.corpus.origin import Origin, find_origin, make_recipe, take_name
 from signface.corpus.store import DescriptorStore, open_store, read_provenance, read_stored
 from signface.descriptors import Descriptors, write_weights
-from signface.elan.export import write_eaf
+from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
 from signface.files import bundled_corpus, shipped
 from tests.fixtures.hand_made import BASES, example, moving_face
@@ -232,7 +232,7 @@ def test_training_and_evaluation_take_what_is_stored(tmp_path, laugh):
     made = example(["N", "J", "N"], take="joy", signer="S1", kind="EU")
     entry = TakeEntry(tmp_path / "joy.csv", "S1", "EU", annotation=tmp_path / "joy.eaf")
     write_weights(made.descriptors, entry.path)
-    write_eaf(entry.annotation, made.reference, signer="S1")
+    write_eaf(made.reference, entry.annotation, signer="S1")
     (first,) = solve_examples(Corpus(tmp_path, (entry,)))
     store = open_store(tmp_path)
     own = find_origin(entry, tmp_path, make_recipe())

@@ -15,18 +15,19 @@ from lxml import etree
 from signface.cli.main import main
 from signface.descriptors import Descriptors, write_weights
 from signface.elan.document import read_document, tier_rows
-from signface.elan.export import write_eaf, write_into
 from signface.elan.mapping import ChannelRule, read_mapping
+from signface.elan.options import EafOptions
 from signface.elan.recogniser import extensions_folder, read_parameters, write_extension, write_tier_file
 from signface.elan.reference import read_corrections, read_reference
 from signface.elan.tiers import affect_tier
+from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
 from signface.evaluation.corrections import changes, summarise_changes
 from signface.label.persistence import load_model, save_model
 from signface.learn.training import Example, train_model
 from signface.segmentation.segments import Segments
 from tests.elan.test_templates import LAB, MAPPING
-from tests.fixtures.elan_files import assert_valid, labelled
+from tests.fixtures.elan_files import assert_valid, labelled, mapped
 
 BASES = ("mouthSmileLeft", "mouthSmileRight", "browDownLeft", "browDownRight", "jawOpen")
 FACES = {"N": (0, 0, 0, 0, 0), "J": (0.9, 0.8, 0, 0, 0.2), "A": (0, 0, 0.9, 0.9, 0)}
@@ -67,7 +68,7 @@ def corpus(tmp_path) -> Path:
         descriptors, truth = acted("N J N A N", seed=number)
         write_weights(descriptors, folder / f"take{number}.csv")
         wrong = truth.table.assign(label=truth.table["label"].str.replace("J", "A"))
-        write_eaf(folder / f"take{number}.eaf", Segments(wrong, name="take"), signer="S1")
+        write_eaf(Segments(wrong, name="take"), folder / f"take{number}.eaf", signer="S1")
         for old, new in (("NA", "NJ"), ("A", "J"), ("AN", "JN")):
             correct(folder / f"take{number}.eaf", old, new)
     rows = "".join(f"take{number}.csv,S1,EU,take{number}.eaf\n" for number in range(3))
@@ -102,7 +103,7 @@ def test_learning_says_so_when_it_makes_things_worse(tmp_path, capsys):
     for name, words in (("joy", "N J N"), ("anger", "N A N")):
         descriptors, truth = acted(words)
         write_weights(descriptors, folder / f"{name}.csv")
-        write_eaf(folder / f"{name}.eaf", truth, signer="S1")
+        write_eaf(truth, folder / f"{name}.eaf", signer="S1")
     rows = "".join(f"{name}.csv,S1,EU,{name}.eaf\n" for name in ("joy", "anger"))
     (folder / "takes.csv").write_text("take,signer,kind,annotation\n" + rows)
     descriptors, truth = acted("N J N A N", seed=9)
@@ -144,7 +145,7 @@ def test_corrections_on_a_labs_own_tier_come_back_as_our_labels(tmp_path):
     path, rules = tmp_path / "lab.eaf", tmp_path / "mapping.toml"
     path.write_text(LAB, "utf-8")
     rules.write_text(MAPPING, "utf-8")
-    write_into(path, labelled(), signer="S1", mapping=read_mapping(rules))
+    write_eaf(labelled(), into=path, signer="S1", options=EafOptions(mapping=str(rules)))
     assert list(read_reference(path, "S1").table["label"]) == ["N", "J", "N"]
     correct(path, "Freude", "neutral")
     before, after = read_corrections(path, "S1")
@@ -156,15 +157,15 @@ def test_a_mapping_of_two_labels_to_one_value_cannot_be_undone(tmp_path):
     path = tmp_path / "lab.eaf"
     path.write_text(LAB, "utf-8")
     rules = {"affect": ChannelRule("Emotion_S1", {"N": "neutral", "J": "Freude", "A": "Freude"}, "")}
-    write_into(path, labelled("N NJ J JA A"), signer="S1", mapping=rules)
+    write_eaf(labelled("N NJ J JA A"), into=path, signer="S1", options=mapped(tmp_path, rules))
     with pytest.raises(SignfaceError, match="label 'Freude' on tier Emotion_S1"):
         read_reference(path, "S1")
 
 
 def test_agreement_is_printed_and_written(tmp_path, capsys):
     first, second = tmp_path / "eva.eaf", tmp_path / "tom.eaf"
-    write_eaf(first, labelled("N NJ J JN N"), signer="S1")
-    write_eaf(second, labelled("N NJ J JN N"), signer="S1")
+    write_eaf(labelled("N NJ J JN N"), first, signer="S1")
+    write_eaf(labelled("N NJ J JN N"), second, signer="S1")
     correct(second, "J", "Su")
     out = tmp_path / "agreement"
     assert main(["elan", "agree", str(first), str(second), "-o", str(out)]) == 0
@@ -181,8 +182,8 @@ def test_agreement_is_printed_and_written(tmp_path, capsys):
 
 def test_agreement_wants_two_files_with_a_tier_in_common(tmp_path, capsys):
     first, second = tmp_path / "a.eaf", tmp_path / "b.eaf"
-    write_eaf(first, labelled(), signer="S1")
-    write_eaf(second, labelled(), signer="S2")
+    write_eaf(labelled(), first, signer="S1")
+    write_eaf(labelled(), second, signer="S2")
     assert main(["elan", "agree", str(first)]) == 2
     assert main(["elan", "agree", str(first), str(second)]) == 2
     assert "no filled tier in common" in capsys.readouterr().err
@@ -190,7 +191,7 @@ def test_agreement_wants_two_files_with_a_tier_in_common(tmp_path, capsys):
 
 def test_check_names_every_problem_and_changes_nothing(tmp_path, capsys):
     good, bad = tmp_path / "good.eaf", tmp_path / "bad.eaf"
-    write_eaf(good, labelled(), signer="S1")
+    write_eaf(labelled(), good, signer="S1")
     bad.write_text(LAB.replace('ANNOTATION_REF="a5"', 'ANNOTATION_REF="a50"').replace('"a6"', '"a5"'), "utf-8")
     before = bad.read_bytes()
     assert main(["elan", "check", str(good)]) == 0

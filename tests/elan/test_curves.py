@@ -7,10 +7,12 @@ import pandas as pd
 import pytest
 from lxml import etree
 
+from signface.annotation import Annotation
 from signface.descriptors import Descriptors
-from signface.elan.curves import curves_table, write_curves, write_tsconf
-from signface.elan.export import write_eaf
+from signface.elan.curves import write_curves, write_tsconf
+from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
+from signface.segmentation.curves import curves_table
 from tests.fixtures.elan_files import assert_valid, labelled
 
 
@@ -31,7 +33,7 @@ def as_elan_reads(path) -> tuple[float, list[list[float]]]:
 @pytest.mark.parametrize("rate", [25.0, 29.97, 60.0, 120.0, 200.0, 240.0])
 def test_elan_finds_the_true_rate_whatever_that_of_the_take(tmp_path, rate):
     path = tmp_path / "take.curves.csv"
-    write_curves(descriptors(rate), labelled(), path)
+    write_curves(curves_table(descriptors(rate), labelled()), path)
     found, rows = as_elan_reads(path)
     for index, row in enumerate(rows):
         assert abs(index / found - row[0]) < 1e-9
@@ -60,7 +62,8 @@ def test_a_missing_value_is_no_zero(tmp_path):
     take = descriptors()
     weights = take.weights.copy()
     weights[100:120] = np.nan
-    write_curves(take.changed("gap", weights=weights, residual=np.full(take.n_frames, np.nan)), labelled(), path)
+    gappy = take.changed("gap", weights=weights, residual=np.full(take.n_frames, np.nan))
+    write_curves(curves_table(gappy, labelled()), path)
     row = next(line for line in path.read_text().splitlines() if line.startswith("0.5500,"))
     assert row.split(",")[4:] == ["NaN", "NaN", "NaN", "NaN"]
 
@@ -79,7 +82,7 @@ def test_a_face_with_other_bases_shows_those_that_move_most():
 
 def test_the_description_points_at_the_columns_it_names(tmp_path):
     curves, tsconf = tmp_path / "take.curves.csv", tmp_path / "take_tsconf.xml"
-    write_curves(descriptors(), labelled(), curves)
+    write_curves(curves_table(descriptors(), labelled()), curves)
     write_tsconf(curves, tsconf, date="2026-01-01")
     root = etree.parse(tsconf).getroot()
     assert (root.tag, root.get("version")) == ("timeseries", "1.0")
@@ -105,9 +108,7 @@ def test_the_description_points_at_the_columns_it_names(tmp_path):
 
 def test_the_eaf_links_both_files_and_elan_shows_the_curves(tmp_path):
     eaf, curves, tsconf = tmp_path / "take.eaf", tmp_path / "take.curves.csv", tmp_path / "take_tsconf.xml"
-    write_curves(descriptors(), labelled(), curves)
-    write_tsconf(curves, tsconf)
-    write_eaf(eaf, labelled(), signer="S1", linked_files=(curves, tsconf))
+    assert write_eaf(Annotation(descriptors(), labelled(), "forest"), eaf, signer="S1") == [eaf, curves, tsconf]
     assert_valid(eaf)
     links = etree.parse(eaf).getroot().findall("HEADER/LINKED_FILE_DESCRIPTOR")
     assert [(link.get("MIME_TYPE"), link.get("RELATIVE_LINK_URL")) for link in links] == [

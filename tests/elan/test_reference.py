@@ -6,8 +6,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from signface.elan.export import write_eaf, write_into
 from signface.elan.reference import read_reference
+from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
 from tests.fixtures.elan_files import labelled
 
@@ -148,7 +148,7 @@ def test_several_signers_ask_for_one(tmp_path):
 
 
 def test_our_own_files_are_read_without_naming_the_signer(tmp_path):
-    write_eaf(tmp_path / "take.eaf", labelled(), signer="S1")
+    write_eaf(labelled(), tmp_path / "take.eaf", signer="S1")
     assert len(read_reference(tmp_path / "take.eaf")) == 5
 
 
@@ -161,7 +161,7 @@ def test_damaged_files_are_read_or_refused_in_one_line(tmp_path, data):
     path = tmp_path / "damaged.eaf"
     damaged = whole[:cut] + junk + whole[cut + data.draw(st.integers(0, 40)) :]
     path.write_bytes(damaged)
-    for attempt in (lambda: read_reference(path), lambda: write_into(path, labelled(), signer="S9")):
+    for attempt in (lambda: read_reference(path), lambda: write_eaf(labelled(), into=path, signer="S9")):
         refused = None
         try:
             attempt()

@@ -7,12 +7,13 @@ import pytest
 from lxml import etree
 
 from signface.elan.document import read_document, tier_rows
-from signface.elan.export import write_eaf, write_into
 from signface.elan.mapping import ChannelRule, read_mapping, suggest_mapping
-from signface.elan.tiers import Tier, doubtful_tier
+from signface.elan.options import EafOptions
+from signface.elan.tiers import Tier
 from signface.elan.vocabularies import AFFECT
+from signface.elan.writing import prepare, write_eaf
 from signface.errors import SignfaceError
-from tests.fixtures.elan_files import assert_valid, labelled, read_back
+from tests.fixtures.elan_files import assert_valid, labelled, mapped, read_back
 
 LAB = """<?xml version="1.0" encoding="UTF-8"?>
 <!-- the lab's own template -->
@@ -86,7 +87,7 @@ def lab(tmp_path):
 def mapping(tmp_path):
     path = tmp_path / "mapping.toml"
     path.write_text(MAPPING, "utf-8")
-    return read_mapping(path)
+    return EafOptions(mapping=str(path))
 
 
 def elements(path, own=()) -> list[tuple]:
@@ -118,9 +119,16 @@ def elements(path, own=()) -> list[tuple]:
     return kept
 
 
+def written_into(lab, segments, **options) -> bool:
+    """Write into a file and say whether it changed."""
+    prepared = prepare(segments, into=lab, signer="S1", **options)
+    prepared.store()
+    return prepared.changed
+
+
 def test_everything_of_others_survives_element_by_element(lab):
     before = elements(lab)
-    assert write_into(lab, labelled(), signer="S1")
+    assert written_into(lab, labelled())
     assert_valid(lab)
     assert elements(lab, own=("affect@S1", "affect-confidence@S1")) == before
     assert [row[2] for row in read_back(lab, "affect@S1")] == ["N", "NJ", "J", "JN", "N"]
@@ -128,12 +136,12 @@ def test_everything_of_others_survives_element_by_element(lab):
 
 
 def test_the_comment_before_the_root_survives(lab):
-    write_into(lab, labelled(), signer="S1")
+    write_eaf(labelled(), into=lab, signer="S1")
     assert "<!-- the lab's own template -->" in lab.read_text("utf-8")
 
 
 def test_identifiers_go_on_after_those_ever_used(lab):
-    write_into(lab, labelled("N"), signer="S1")
+    write_eaf(labelled("N"), into=lab, signer="S1")
     root = etree.parse(lab).getroot()
     own = root.find("TIER[@TIER_ID='affect@S1']/ANNOTATION/ALIGNABLE_ANNOTATION")
     assert own.get("ANNOTATION_ID") == "a18"  # 17 was remembered in the header
@@ -144,17 +152,17 @@ def test_identifiers_go_on_after_those_ever_used(lab):
 
 
 def test_writing_the_same_twice_changes_nothing(lab):
-    write_into(lab, labelled(), signer="S1")
+    write_eaf(labelled(), into=lab, signer="S1")
     once = lab.read_bytes()
-    assert not write_into(lab, labelled(), signer="S1")
+    assert not written_into(lab, labelled())
     assert lab.read_bytes() == once
     assert len(list(lab.parent.glob("*.bak*"))) == 1
 
 
 def test_our_own_uncorrected_tiers_are_brought_up_to_date(lab):
-    write_into(lab, labelled(), signer="S1")
+    write_eaf(labelled(), into=lab, signer="S1")
     once = elements(lab, own=("affect@S1", "affect-confidence@S1"))
-    assert write_into(lab, labelled("A AN N"), signer="S1")
+    assert written_into(lab, labelled("A AN N"))
     assert_valid(lab)
     assert elements(lab, own=("affect@S1", "affect-confidence@S1")) == once
     assert [row[2] for row in read_back(lab, "affect@S1")] == ["A", "AN", "N"]
@@ -163,29 +171,29 @@ def test_our_own_uncorrected_tiers_are_brought_up_to_date(lab):
 
 
 def test_a_corrected_tier_is_kept_unless_asked_otherwise(lab):
-    write_into(lab, labelled(), signer="S1")
+    write_eaf(labelled(), into=lab, signer="S1")
     corrected = lab.read_text("utf-8").replace(
         "<ANNOTATION_VALUE>J</ANNOTATION_VALUE>", "<ANNOTATION_VALUE>Su</ANNOTATION_VALUE>"
     )
     lab.write_text(corrected, "utf-8")
     with pytest.raises(SignfaceError, match=r"affect@S1 holds annotations .* corrected since.*--replace"):
-        write_into(lab, labelled("A AN N"), signer="S1")
+        write_eaf(labelled("A AN N"), into=lab, signer="S1")
     assert lab.read_text("utf-8") == corrected
-    assert write_into(lab, labelled("A AN N"), signer="S1", replace=True)
+    assert written_into(lab, labelled("A AN N"), replace=True)
     assert corrected in [backup.read_text("utf-8") for backup in lab.parent.glob("*.bak*")]
 
 
 def test_a_moved_boundary_is_a_correction_too(lab):
-    write_into(lab, labelled(), signer="S1")
+    write_eaf(labelled(), into=lab, signer="S1")
     moved = lab.read_text("utf-8").replace('TIME_VALUE="2500"', 'TIME_VALUE="2400"')
     lab.write_text(moved, "utf-8")
     with pytest.raises(SignfaceError, match="corrected since"):
-        write_into(lab, labelled("A AN N"), signer="S1")
+        write_eaf(labelled("A AN N"), into=lab, signer="S1")
 
 
 def test_other_signers_tiers_are_others(lab):
-    write_into(lab, labelled(), signer="S1")
-    write_into(lab, labelled("A AN N"), signer="S2")
+    write_eaf(labelled(), into=lab, signer="S1")
+    write_eaf(labelled("A AN N"), into=lab, signer="S2")
     assert_valid(lab)
     assert [row[2] for row in read_back(lab, "affect@S1")] == ["N", "NJ", "J", "JN", "N"]
     assert [row[2] for row in read_back(lab, "affect@S2")] == ["A", "AN", "N"]
@@ -194,7 +202,7 @@ def test_other_signers_tiers_are_others(lab):
 
 
 def test_a_tier_that_hangs_on_ours_is_never_lost(lab):
-    write_into(lab, labelled(), signer="S1")
+    write_eaf(labelled(), into=lab, signer="S1")
     root = etree.parse(lab).getroot()
     own = root.find("TIER[@TIER_ID='affect@S1']/ANNOTATION/ALIGNABLE_ANNOTATION").get("ANNOTATION_ID")
     note = etree.fromstring(
@@ -206,14 +214,14 @@ def test_a_tier_that_hangs_on_ours_is_never_lost(lab):
     etree.ElementTree(root).write(lab)
     before = lab.read_bytes()
     with pytest.raises(SignfaceError, match="the tier note hangs on affect@S1"):
-        write_into(lab, labelled("A AN N"), signer="S1", replace=True)
+        write_eaf(labelled("A AN N"), into=lab, signer="S1", replace=True)
     assert lab.read_bytes() == before
 
 
 def test_a_vocabulary_of_the_same_name_is_not_touched(lab):
     lab.write_text(LAB.replace("Emotionen", "affect"), "utf-8")
     before = elements(lab)
-    write_into(lab, labelled(), signer="S1")
+    write_eaf(labelled(), into=lab, signer="S1")
     assert_valid(lab)
     root = etree.parse(lab).getroot()
     assert (
@@ -227,7 +235,7 @@ def test_a_vocabulary_of_the_same_name_is_not_touched(lab):
 
 def test_labels_become_the_labs_values_on_the_labs_tiers(lab, mapping):
     before = elements(lab, own=("Emotion_S1", "Certainty_S1"))
-    write_into(lab, labelled(), signer="S1", mapping=mapping)
+    write_eaf(labelled(), into=lab, signer="S1", options=mapping)
     assert_valid(lab)
     assert [row[:3] for row in read_back(lab, "Emotion_S1")] == [
         (0, 500, "neutral"),
@@ -244,7 +252,7 @@ def test_a_template_gives_its_structure_and_none_of_its_annotations(lab, mapping
     out = tmp_path / "take.eaf"
     template = tmp_path / "lab.etf"
     template.write_text(LAB, "utf-8")
-    write_eaf(out, labelled(), signer="S1", template=template, mapping=mapping)
+    write_eaf(labelled(), out, signer="S1", options=mapping.changed(template=str(template)))
     assert_valid(out)
     root = etree.parse(out).getroot()
     assert [tier.get("TIER_ID") for tier in root.iterfind("TIER")] == ["Gloss", "Comment", "Emotion_S1", "Certainty_S1"]
@@ -253,40 +261,41 @@ def test_a_template_gives_its_structure_and_none_of_its_annotations(lab, mapping
     assert [language.get("LANG_ID") for language in root.iterfind("LANGUAGE")] == ["deu", "eng"]
     assert root.find("HEADER/MEDIA_DESCRIPTOR") is None
     assert template.read_text("utf-8") == LAB
-    write_eaf(out, labelled("N NJ J"), signer="S1", template=template, mapping=mapping)  # our own output: written over
+    write_eaf(
+        labelled("N NJ J"), out, signer="S1", options=mapping.changed(template=str(template))
+    )  # our own output: written over
 
 
 def test_a_label_outside_the_labs_vocabulary_is_refused_before_anything_is_written(lab, mapping, tmp_path):
     with pytest.raises(
         SignfaceError, match=r"'A' \(affect\) is not in the closed vocabulary of the tier Emotion_S1.*neutral"
     ):
-        write_into(lab, labelled("N NA A"), signer="S1", mapping=mapping)
+        write_eaf(labelled("N NA A"), into=lab, signer="S1", options=mapping)
     assert lab.read_text("utf-8") == LAB
     with pytest.raises(SignfaceError, match="not in the closed vocabulary"):
-        write_eaf(tmp_path / "new.eaf", labelled("N NA A"), signer="S1", template=lab, mapping=mapping)
+        write_eaf(labelled("N NA A"), tmp_path / "new.eaf", signer="S1", options=mapping.changed(template=str(lab)))
     assert not (tmp_path / "new.eaf").exists()
 
 
-def test_a_mapping_to_a_missing_tier_names_those_there_are(lab):
+def test_a_mapping_to_a_missing_tier_names_those_there_are(lab, tmp_path):
     with pytest.raises(SignfaceError, match=r"no tier Mood.*Gloss, Comment, Emotion_S1"):
-        write_into(lab, labelled(), signer="S1", mapping={"affect": ChannelRule("Mood")})
+        write_eaf(labelled(), into=lab, signer="S1", options=mapped(tmp_path, {"affect": ChannelRule("Mood")}))
 
 
-def test_a_mapping_to_a_dependent_tier_is_refused(lab):
+def test_a_mapping_to_a_dependent_tier_is_refused(lab, tmp_path):
     with pytest.raises(SignfaceError, match=r"the tier Comment depends on Gloss \(Symbolic_Association\)"):
-        write_into(lab, labelled(), signer="S1", mapping={"affect": ChannelRule("Comment")})
+        write_eaf(labelled(), into=lab, signer="S1", options=mapped(tmp_path, {"affect": ChannelRule("Comment")}))
 
 
-def test_two_channels_do_not_share_a_tier(lab):
+def test_two_channels_do_not_share_a_tier(lab, tmp_path):
     rules = {"affect": ChannelRule("Emotion_S1", {"N": "neutral"}), "affect-doubtful": ChannelRule("Emotion_S1")}
-    doubtful = doubtful_tier(labelled("N"), "S1", below=1.0)
     rules["affect-doubtful"] = ChannelRule("Emotion_S1", {"N": "neutral"})
     with pytest.raises(SignfaceError, match="two channels are mapped to the tier Emotion_S1"):
-        write_into(lab, labelled("N"), signer="S1", tiers=[doubtful], mapping=rules)
+        write_eaf(labelled("N"), into=lab, signer="S1", options=mapped(tmp_path, rules, doubtful=1.0))
 
 
-def test_a_channel_can_be_left_out(lab):
-    write_into(lab, labelled(), signer="S1", mapping={"affect-confidence": ChannelRule("")})
+def test_a_channel_can_be_left_out(lab, tmp_path):
+    write_eaf(labelled(), into=lab, signer="S1", options=mapped(tmp_path, {"affect-confidence": ChannelRule("")}))
     names = [tier.get("TIER_ID") for tier in etree.parse(lab).getroot().iterfind("TIER")]
     assert "affect@S1" in names
     assert "affect-confidence@S1" not in names
@@ -295,7 +304,7 @@ def test_a_channel_can_be_left_out(lab):
 def test_doubtful_segments_stand_on_a_tier_of_their_own(tmp_path):
     path = tmp_path / "take.eaf"
     segments = labelled("N NJ J JN N")  # confidences 0.9 to 0.5
-    write_eaf(path, segments, signer="S1", tiers=[doubtful_tier(segments, "S1", below=0.65)])
+    write_eaf(segments, path, signer="S1", options=EafOptions(doubtful=0.65))
     assert_valid(path)
     assert [row[:3] for row in read_back(path, "affect-doubtful@S1")] == [(1500, 2000, "JN"), (2000, 2500, "N")]
 
@@ -321,7 +330,7 @@ def test_files_of_before_28_become_30_with_all_they_hold(tmp_path, version, mapp
     text = text.replace('"3.0"', f'"{version}"').replace("EAFv3.0", f"EAFv{version}")
     old = tmp_path / "old.eaf"
     old.write_text(text, "utf-8")
-    write_into(old, labelled(), signer="S1", mapping=mapping)
+    write_eaf(labelled(), into=old, signer="S1", options=mapping)
     assert_valid(old)
     root = etree.parse(old).getroot()
     values = root.findall("CONTROLLED_VOCABULARY[@CV_ID='Emotionen']/CV_ENTRY_ML/CVE_VALUE")
@@ -333,8 +342,8 @@ def test_files_of_before_28_become_30_with_all_they_hold(tmp_path, version, mapp
 
 def test_five_thousand_annotations_stay_when_others_go_in(tmp_path):
     big = tmp_path / "big.eaf"
-    write_eaf(big, labelled(" ".join(["N", "NJ", "J", "JN"] * 1250), step=0.25), signer="S1")
-    write_into(big, labelled("N NA A"), signer="S2")
+    write_eaf(labelled(" ".join(["N", "NJ", "J", "JN"] * 1250), step=0.25), big, signer="S1")
+    write_eaf(labelled("N NA A"), into=big, signer="S2")
     assert len(read_back(big, "affect@S2")) == 3
     assert len(read_back(big, "affect@S1")) == 5000
 
@@ -364,7 +373,7 @@ def test_broken_files_are_refused_and_never_altered(lab, old, new, message):
     broken = LAB.replace(old, new, 1)
     lab.write_text(broken, "utf-8")
     with pytest.raises(SignfaceError, match=message) as caught:
-        write_into(lab, labelled(), signer="S1", replace=True)
+        write_eaf(labelled(), into=lab, signer="S1", replace=True)
     assert "\n" not in str(caught.value)
     assert lab.read_text("utf-8") == broken
     assert [path.name for path in lab.parent.iterdir()] == ["lab.eaf"]

@@ -19,8 +19,8 @@ from signface.annotation import annotate
 from signface.cli.main import main
 from signface.corpus.manifest import TakeEntry, write_takes
 from signface.descriptors import write_weights
-from signface.elan.export import write_eaf
 from signface.elan.reference import read_reference
+from signface.elan.writing import write_eaf
 from signface.evaluation.protocol import evaluate, folds_of
 from signface.label.intensity import INTENSITIES
 from signface.label.persistence import load_model, save_model
@@ -126,7 +126,7 @@ def test_a_model_keeps_its_intensities_on_disk_and_annotates_them(takes, tmp_pat
     save_model(model, tmp_path / "m.skops")
     loaded = load_model(tmp_path / "m.skops")
     unseen = graded("new", 98).descriptors
-    one, other = (annotate(unseen, model=m).segments.table for m in (model, loaded))
+    one, other = (annotate(unseen, m).segments.table for m in (model, loaded))
     pd.testing.assert_frame_equal(one, other)
     assert set(one["intensity"].dropna()) == {1, 2, 3}
 
@@ -135,7 +135,7 @@ def test_annotate_writes_what_the_classifier_has_learnt_into_the_tier_of_intensi
     entries = []
     for e in takes:
         write_weights(e.descriptors, tmp_path / "feel" / f"{e.take}.csv")
-        write_eaf(tmp_path / "feel" / f"{e.take}.eaf", e.reference, signer=e.signer)
+        write_eaf(e.reference, tmp_path / "feel" / f"{e.take}.eaf", signer=e.signer)
         entries.append(
             TakeEntry(tmp_path / "feel" / f"{e.take}.csv", "S1", "IE", annotation=tmp_path / "feel" / f"{e.take}.eaf")
         )

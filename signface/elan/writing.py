@@ -1,0 +1,404 @@
+"""What was found in a take as EAF 3.0, with its colours and curves: written together or not at all.
+
+- `write_eaf`: a new file, one from a lab's template, or our tiers into a file that is there.
+- `prepare`: the same up to the writing, so that every reason to refuse comes before any file.
+- `to_pympi`: the same as an object of pympi-ling, for scripts.
+- `check_writable`: whether a file may be overwritten.
+"""
+
+from __future__ import annotations
+
+import datetime
+import json
+import tempfile
+import uuid
+from collections.abc import Iterable
+from collections.abc import Mapping as MappingABC
+from dataclasses import dataclass
+from importlib.metadata import version
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import pandas as pd
+from lxml import etree
+
+from signface.channels.events import ChannelEvents
+from signface.elan.channels import channel_tiers
+from signface.elan.checking import check_document
+from signface.elan.curves import write_curves, write_tsconf
+from signface.elan.document import (
+    PROPERTY_PREFIX,
+    SCHEMA_URL,
+    XSI,
+    back_up,
+    is_unmodified_output,
+    iso_date,
+    read_document,
+    recorded,
+    set_property,
+    tier_rows,
+    write_document,
+)
+from signface.elan.elements import CONSTRAINTS, add_link, add_media
+from signface.elan.merging import put_tiers
+from signface.elan.options import EafOptions
+from signface.elan.preferences import write_preferences
+from signface.elan.tiers import Tier, affect_tier, doubtful_tier, xml_text
+from signface.elan.upgrade import upgrade
+from signface.elan.vocabularies import AFFECT, Vocabulary
+from signface.errors import SignfaceError
+from signface.segmentation.segments import Segments
+from signface.signer import Signer
+
+if TYPE_CHECKING:
+    from pympi.Elan import Eaf
+
+#: What ELAN knows a description of curves by.
+TSCONF = "_tsconf.xml"
+
+
+class Results(Protocol):
+    """What can be written: `signface.annotation.Annotation`, or anything that holds the like."""
+
+    @property
+    def segments(self) -> Segments:
+        """Labelled, with confidence; with `intensity` where it is known."""
+        ...
+
+    @property
+    def channels(self) -> MappingABC[str, ChannelEvents] | None:
+        """Events by channel."""
+        ...
+
+    @property
+    def curves(self) -> pd.DataFrame:
+        """`time_s` and curves (`signface.segmentation.curves.curves_table`)."""
+        ...
+
+    @property
+    def signer(self) -> Signer:
+        """Names the tiers."""
+        ...
+
+    @property
+    def facts(self) -> MappingABC[str, str]:
+        """What the header of the file says of the results."""
+        ...
+
+
+def write_eaf(
+    annotation: Results | Segments,
+    path: str | PathLike[str] | None = None,
+    *,
+    into: str | PathLike[str] | None = None,
+    options: EafOptions | None = None,
+    signer: str | None = None,
+    video: str | PathLike[str] | None = None,
+    vocabulary: Vocabulary = AFFECT,
+    properties: MappingABC[str, str] | None = None,
+    date: datetime.datetime | str | None = None,
+    replace: bool = False,
+) -> list[Path]:
+    """Write what was found in a take: `TAKE.eaf`, ELAN's colours and the curves of its timeseries viewer beside it.
+
+    The tiers are `affect@SIGNER` with a closed vocabulary and, dependent on it by symbolic association,
+    `affect-confidence@SIGNER` and `intensity@SIGNER` where the segments have those columns; and one for each channel.
+
+    Into a file that is there, only our own tiers are added or replaced: every other tier, annotation, identifier, time
+    slot, comment, property, licence, link, locale, lexicon and external reference stays as it is. Files of EAF 2.5 to
+    2.8 become 3.0. The file before is kept as a backup; when nothing would change in it, it is not written.
+
+    Parameters
+    ----------
+    annotation : Annotation or Segments
+        Times in seconds from the beginning of the video (a take's `start` is already in them). Segments alone have
+        neither channels nor curves.
+    path : path, optional
+        The `.eaf` to write: this or `into`.
+    into : path, optional
+        An `.eaf` that is there, changed in place. It has tiers of its own: a template is not used.
+    options : EafOptions, optional
+        Template, mapping, doubtful segments, curves, author.
+    signer : str, optional
+        Names the tiers and is their participant; the annotation's own signer when not given. Empty for tiers without
+        `@`.
+    video : path or URL, optional
+        The media file that the annotations belong to.
+    vocabulary : Vocabulary
+        The labels allowed on the affect tier.
+    properties : mapping, optional
+        What the header says besides the tool, its version and the annotation's facts. Each is written as
+        `signface:NAME`.
+    date : datetime or str, optional
+        The document's date (ISO 8601); now when not given. With a date, the same input gives the same bytes.
+    replace : bool
+        Overwrite a file that holds more than signface's own unmodified output, or what an annotator corrected in our
+        tiers. The file before is then kept beside it as `.bak`.
+
+    Returns
+    -------
+    list of Path
+        What belongs to the take, the `.eaf` first: the curves, and their description unless the file has one of its
+        own.
+
+    Raises
+    ------
+    SignfaceError
+        The segments carry no label or one outside the vocabulary; the template or the mapping does not fit; the file
+        exists and someone has worked in it, or is broken (`checking.check_document`); annotations of others would be
+        lost; the take ends before time 0; the folder cannot be written. Files are then as they were.
+
+    See Also
+    --------
+    signface.annotation.annotate : finds what is written.
+    signface.elan.reference.read_reference : reads it back.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> import pandas as pd
+    >>> from signface.segmentation.segments import Segments
+    >>> rows = [(0.0, 1.2, "stable", "N"), (1.2, 1.5, "transition", "NJ"), (1.5, 2.4, "stable", "J")]
+    >>> segments = Segments(pd.DataFrame(rows, columns=["start_s", "end_s", "kind", "label"]), name="take")
+    >>> [file.name for file in write_eaf(segments, Path(mkdtemp()) / "take.eaf", signer="Eva")]
+    ['take.eaf']
+    """
+    return prepare(
+        annotation,
+        path,
+        into=into,
+        options=options,
+        signer=signer,
+        video=video,
+        vocabulary=vocabulary,
+        properties=properties,
+        date=date,
+        replace=replace,
+    ).store()
+
+
+def prepare(
+    annotation: Results | Segments,
+    path: str | PathLike[str] | None = None,
+    *,
+    into: str | PathLike[str] | None = None,
+    options: EafOptions | None = None,
+    signer: str | None = None,
+    video: str | PathLike[str] | None = None,
+    vocabulary: Vocabulary = AFFECT,
+    properties: MappingABC[str, str] | None = None,
+    date: datetime.datetime | str | None = None,
+    replace: bool = False,
+) -> PreparedDocument:
+    """What `write_eaf` writes, before anything is written. Parameters and errors are those of `write_eaf`."""
+    if (path is None) == (into is None):
+        raise SignfaceError("an annotation goes to a path or into a file that is there, one of them")
+    options = EafOptions() if options is None else options
+    file = Path(path if into is None else into)  # type: ignore[arg-type]
+    if into is None:
+        check_writable(file, replace=replace)
+        root = _new_document() if options.template is None else _read_template(options.template)
+        root.set("AUTHOR", xml_text(options.author))
+    else:
+        root = read_document(file).getroot()
+        check_document(root, file)
+        upgrade(root)
+    curves, tiers, facts = None, [], dict(properties or {})
+    if isinstance(annotation, Segments):
+        segments, signer = annotation, signer or ""
+    else:
+        segments, signer = annotation.segments, annotation.signer.name if signer is None else signer
+        curves = annotation.curves if options.curves else None
+        facts = {**annotation.facts, **facts}
+        tiers = channel_tiers((annotation.channels or {}).values(), signer)
+    if options.doubtful is not None:
+        tiers = [doubtful_tier(segments, signer, below=options.doubtful, vocabulary=vocabulary), *tiers]
+    all_tiers = (affect_tier(segments, signer, vocabulary=vocabulary), *tiers)
+    links = () if curves is None else _curve_files(root, file)
+    source = file if into is not None or options.template is None else Path(options.template)
+    changed = put_tiers(root, all_tiers, mapping=options.rules, replace=replace, file=source)
+    if changed or into is None:
+        root.set("DATE", iso_date(date))
+        _fill_header(root, file, segments, video, facts, links)
+    keep_previous = True
+    if into is None:
+        rows = tier_rows(root)
+        content = json.dumps([root.get("DATE"), segments.name, rows], ensure_ascii=False)
+        set_property(root, "URN", f"urn:nl-mpi-tools-elan-eaf:{uuid.uuid5(uuid.NAMESPACE_URL, content)}")
+        set_property(root, f"{PROPERTY_PREFIX}tiers", json.dumps(list(rows), ensure_ascii=False))
+        same = _untouched(file) and recorded(read_document(file).getroot()) == recorded(root)
+        keep_previous, changed = file.is_file() and not same, True
+    return PreparedDocument(file, root.getroottree(), all_tiers, links, curves, keep_previous, changed, date)
+
+
+def to_pympi(annotation: Results | Segments, *, options: EafOptions | None = None, signer: str | None = None) -> Eaf:
+    """What `write_eaf` writes, without curves, as pympi-ling's object for scripts.
+
+    What pympi writes again has no colours, and links between annotations are lost: files for annotators come from
+    `write_eaf`.
+
+    Raises
+    ------
+    SignfaceError
+        As `write_eaf`.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from signface.segmentation.segments import Segments
+    >>> rows = [(0.0, 1.2, "stable", "N"), (1.2, 1.5, "transition", "NJ"), (1.5, 2.4, "stable", "J")]
+    >>> segments = Segments(pd.DataFrame(rows, columns=["start_s", "end_s", "kind", "label"]), name="take")
+    >>> to_pympi(segments, signer="Eva").get_annotation_data_for_tier("affect@Eva")
+    [(0, 1200, 'N'), (1200, 1500, 'NJ'), (1500, 2400, 'J')]
+    """
+    from pympi.Elan import Eaf
+
+    options = (EafOptions() if options is None else options).changed(curves=False)
+    with tempfile.TemporaryDirectory() as folder:  # pympi reads from a path only
+        file = Path(folder) / "take.eaf"
+        write_document(prepare(annotation, file, options=options, signer=signer).tree, file)
+        return Eaf(str(file))
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedDocument:
+    """A document that is complete and allowed to be written, and has not been yet.
+
+    Parameters
+    ----------
+    file : Path
+        Where it goes.
+    tree : ElementTree
+    tiers : tuple of Tier
+        What was put into it, for the colours.
+    links : tuple of Path
+        The curves' csv and, where they get one, their description; empty without curves.
+    curves : DataFrame, optional
+    keep_previous : bool
+        Whether the file that is there is kept as a backup.
+    changed : bool
+        Whether the document has to be written.
+    date : datetime or str, optional
+        The date in the description of the curves.
+    """
+
+    file: Path
+    tree: etree._ElementTree
+    tiers: tuple[Tier, ...]
+    links: tuple[Path, ...] = ()
+    curves: pd.DataFrame | None = None
+    keep_previous: bool = False
+    changed: bool = True
+    date: datetime.datetime | str | None = None
+
+    def store(self) -> list[Path]:
+        """Write the curves, the document, its colours, and the backup of what was there.
+
+        Returns
+        -------
+        list of Path
+            What belongs to the take, the `.eaf` first.
+        """
+        if self.curves is not None:
+            write_curves(self.curves, self.links[0])
+            for description in self.links[1:]:
+                write_tsconf(self.links[0], description, date=self.date)
+        if self.changed:
+            if self.keep_previous:
+                back_up(self.file)
+            write_document(self.tree, self.file)
+            curves = self.links[0] if self.links else None
+            write_preferences(self.file.with_suffix(".pfsx"), self.tiers, curves=curves)
+        return [self.file, *self.links]
+
+
+def check_writable(path: str | PathLike[str], *, replace: bool = False) -> None:
+    """Refuse, before anything is written, to overwrite what an annotator made.
+
+    Raises
+    ------
+    SignfaceError
+        The file exists, is not our own unmodified output, and `replace` is False.
+    """
+    file = Path(path)
+    if not replace and file.exists() and not _untouched(file):
+        raise SignfaceError(
+            "exists and holds annotations that signface did not write or that were corrected since",
+            file=file,
+            hint="write to another file, or ask for it to be replaced (--replace); it is then kept as a backup",
+        )
+
+
+def _untouched(file: Path) -> bool:
+    """Whether a file that is there is our own output which nobody has changed."""
+    try:
+        return is_unmodified_output(read_document(file).getroot())
+    except SignfaceError:
+        return False  # not an EAF of ours, whatever it is
+
+
+def _curve_files(root: etree._Element, file: Path) -> tuple[Path, ...]:
+    """The curves' csv and its description, which is left out where the file links one of others.
+
+    ELAN reads only one description of curves.
+    """
+    curves, description = file.with_suffix(".curves.csv"), file.with_name(file.stem + TSCONF)
+    links = root.iterfind("HEADER/LINKED_FILE_DESCRIPTOR")
+    names = [(link.get("LINK_URL") or "").rpartition("/")[2] for link in links]
+    others = any(name.endswith(TSCONF) and name != description.name for name in names)
+    return (curves,) if others else (curves, description)
+
+
+def _new_document() -> etree._Element:
+    """The root of a document without tiers."""
+    root = etree.Element("ANNOTATION_DOCUMENT", nsmap={"xsi": XSI})
+    root.set("FORMAT", "3.0")
+    root.set("VERSION", "3.0")
+    root.set(f"{{{XSI}}}noNamespaceSchemaLocation", SCHEMA_URL)
+    etree.SubElement(root, "HEADER", MEDIA_FILE="", TIME_UNITS="milliseconds")
+    etree.SubElement(root, "TIME_ORDER")
+    etree.SubElement(root, "LOCALE", COUNTRY_CODE="US", LANGUAGE_CODE="en")
+    for stereotype, description in CONSTRAINTS.items():
+        etree.SubElement(root, "CONSTRAINT", STEREOTYPE=stereotype, DESCRIPTION=description)
+    return root
+
+
+def _read_template(template: str | PathLike[str]) -> etree._Element:
+    """The root of a template as EAF 3.0, without annotations, time slots, links between annotations and media."""
+    root = read_document(template).getroot()
+    check_document(root, Path(template))
+    upgrade(root)
+    for annotation in root.findall("TIER/ANNOTATION"):
+        annotation.getparent().remove(annotation)
+    for element in [
+        *root.findall("REF_LINK_SET"),
+        *root.findall("TIME_ORDER/*"),
+        *root.findall("HEADER/MEDIA_DESCRIPTOR"),
+        *root.findall("HEADER/LINKED_FILE_DESCRIPTOR"),
+        *root.findall("HEADER/PROPERTY"),
+    ]:
+        element.getparent().remove(element)
+    return root
+
+
+def _fill_header(
+    root: etree._Element,
+    file: Path,
+    segments: Segments,
+    video: str | PathLike[str] | None,
+    properties: MappingABC[str, str],
+    linked_files: Iterable[str | PathLike[str]],
+) -> None:
+    """Media, links, and the properties that say what wrote the tiers and from what."""
+    header = root.find("HEADER")
+    if video is not None:
+        add_media(header, video, file)
+    for linked in linked_files:
+        add_link(header, linked, file)
+    details = {"tool": "signface", "version": version("signface"), "take": segments.name, **properties}
+    if segments.history:
+        details.setdefault("history", "; ".join(segments.history))
+    for name, value in details.items():
+        set_property(root, PROPERTY_PREFIX + name, xml_text(str(value)))
