@@ -64,7 +64,7 @@ class Annotation:
     >>> from signface.takes.reading import read_take
     >>> annotation = annotate(read_take(bundled_corpus() / "M1_IE_J.c3d"), load_model("default"), channels=True)
     >>> annotation
-    <Annotation of M1_IE_J: 3 stable segments, 8 channels, by default>
+    <Annotation of M1_IE_J: 5 stable segments, 7 channels, by default>
     >>> annotation.channels["head"].table["value"].tolist()
     []
     >>> annotation.curves.columns[:3].tolist()
