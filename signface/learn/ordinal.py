@@ -71,15 +71,19 @@ def ordinal_metrics(truth: Sequence[int], found: Sequence[int]) -> dict:
     >>> scores["exact"], scores["within_one"], scores["mean_absolute_error"]
     (0.5, 0.75, 0.75)
     """
+    from sklearn.metrics import cohen_kappa_score
+
     if not len(truth):
         return {"n": 0, "exact": None, "within_one": None, "mean_absolute_error": None, "quadratic_kappa": None}
     one, other = np.asarray(truth, int), np.asarray(found, int)
     distance = np.abs(one - other)
-    chance = float(np.mean((one[:, None] - other[None, :]) ** 2))
+    steps = range(min(one.min(), other.min()), max(one.max(), other.max()) + 1)
     return {
         "n": len(one),
         "exact": float(np.mean(distance == 0)),
         "within_one": float(np.mean(distance <= 1)),
         "mean_absolute_error": float(distance.mean()),
-        "quadratic_kappa": None if chance == 0 else float(1 - np.mean(distance**2) / chance),
+        "quadratic_kappa": float(cohen_kappa_score(one, other, weights="quadratic", labels=list(steps)))
+        if len(steps) > 1
+        else None,
     }

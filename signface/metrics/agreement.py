@@ -63,12 +63,12 @@ def cohen_kappa(first: np.ndarray, second: np.ndarray) -> float:
     >>> cohen_kappa(np.array(["N", "N", "J", "J"]), np.array(["N", "J", "J", "J"]))
     0.5
     """
-    if not len(first):
+    from sklearn.metrics import cohen_kappa_score
+
+    first, second = np.asarray(first).astype(str), np.asarray(second).astype(str)
+    if len(set(first) | set(second)) < 2:
         return float("nan")
-    values, codes = np.unique(np.concatenate([first, second]).astype(str), return_inverse=True)
-    table = np.zeros((len(values), len(values)))
-    np.add.at(table, (codes[: len(first)], codes[len(first) :]), 1)
-    return _kappa(table, table.sum(axis=1) @ table.sum(axis=0) / table.sum() ** 2)
+    return float(cohen_kappa_score(first, second))
 
 
 def _kappa(table: np.ndarray, chance: float) -> float:

@@ -11,6 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from signface.metrics.bootstrap import mean_interval
+
 
 def classification_metrics(truth: Sequence[str], found: Sequence[str], labels: Sequence[str]) -> dict:
     """Accuracy and its company.
@@ -83,8 +85,6 @@ def accuracy_interval(
 ) -> tuple[float, float] | None:
     """Interval of the accuracy when whole takes are drawn again with replacement (a cluster bootstrap).
 
-    The segments of one take are alike, so that the usual interval of a share would be far too narrow.
-
     Parameters
     ----------
     hits : (K,) sequence of bool
@@ -97,16 +97,17 @@ def accuracy_interval(
     Returns
     -------
     (low, high), or None with fewer than two takes.
+
+    See Also
+    --------
+    signface.metrics.bootstrap.mean_interval : the same for any mean.
     """
     names, index = np.unique(np.asarray(takes, dtype=str), return_inverse=True)
     if len(names) < 2:
         return None
     right = np.bincount(index, weights=np.asarray(hits, dtype=float), minlength=len(names))
     count = np.bincount(index, minlength=len(names))
-    drawn = np.random.default_rng(seed).integers(len(names), size=(draws, len(names)))
-    shares = right[drawn].sum(axis=1) / count[drawn].sum(axis=1)
-    low, high = np.quantile(shares, [(1 - level) / 2, (1 + level) / 2])
-    return float(low), float(high)
+    return mean_interval(right, count, seed=seed, draws=draws, level=level)
 
 
 def mcnemar(first: Sequence[bool], second: Sequence[bool]) -> dict:

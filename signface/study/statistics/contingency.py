@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from signface.metrics import classification
 from signface.study.statistics.effect_sizes import cramers_v
 from signface.study.statistics.test_result import TestResult, untestable
 
@@ -66,17 +67,15 @@ def mcnemar(first: ArrayLike, second: ArrayLike) -> TestResult:
         NaN where missing. The statistic is the number of pairs that only `first` got right, out of `n` pairs that
         differ: exact, so that it has no condition on effectives.
     """
-    from scipy import stats
-
-    a, b = np.asarray(first, float), np.asarray(second, float)
-    kept = ~(np.isnan(a) | np.isnan(b)) & np.isin(a, (0, 1)) & np.isin(b, (0, 1))
-    a, b = a[kept], b[kept]
-    only_first, only_second = int(((a == 1) & (b == 0)).sum()), int(((a == 0) & (b == 1)).sum())
-    n = only_first + only_second
+    one, other = np.asarray(first, float), np.asarray(second, float)
+    kept = np.isin(one, (0, 1)) & np.isin(other, (0, 1))
+    one, other = one[kept] == 1, other[kept] == 1
+    counts = classification.mcnemar(one, other)
+    n = counts["only_first"] + counts["only_second"]
     if not n:
-        return untestable("McNemar", "b", len(a), "no pair differs")
-    p = stats.binomtest(only_first, n, 0.5).pvalue
-    return TestResult("McNemar", "b", float(only_first), float(p), n, None, "difference", float(a.mean() - b.mean()))
+        return untestable("McNemar", "b", len(one), "no pair differs")
+    difference = float(one.mean() - other.mean())
+    return TestResult("McNemar", "b", float(counts["only_first"]), counts["p"], n, None, "difference", difference)
 
 
 def cochran(blocks: ArrayLike) -> TestResult:

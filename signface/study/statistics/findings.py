@@ -13,9 +13,9 @@ import math
 from itertools import combinations
 
 from signface.study.responses import Responses
-from signface.study.statistics.corrections import holm
 from signface.study.statistics.model_tables import MethodComparison
 from signface.study.statistics.tables import StudyTable, write_p
+from signface.study.statistics.test_result import holm
 
 
 def findings(

@@ -3,8 +3,7 @@
 - `participant_interval`: of one mean.
 - `difference_intervals`: of the differences between methods.
 
-Participants are drawn with replacement, each with all their answers, so that the answers of one person stay together.
-The intervals are percentiles at 95 %; with fewer than some 20 participants they are a little too short.
+Participants are drawn with replacement, each with all their answers (`signface.metrics.bootstrap`).
 """
 
 from __future__ import annotations
@@ -13,6 +12,8 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from signface.metrics.bootstrap import cluster_draws, mean_interval
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,11 +41,8 @@ def participant_interval(
     each = table.dropna(subset=[column]).groupby("participant")[column].agg(["sum", "size"]).sort_index()
     if each.empty:
         return float("nan"), float("nan"), float("nan")
-    weights = _draws(len(each), resamples, seed)
-    means = (weights @ each["sum"].to_numpy()) / (weights @ each["size"].to_numpy())
-    tail = 50 * (1 - level)
-    low, high = np.percentile(means, [tail, 100 - tail])
-    return float(each["sum"].sum() / each["size"].sum()), float(low), float(high)
+    interval = mean_interval(each["sum"], each["size"], seed=seed, draws=resamples, level=level)
+    return float(each["sum"].sum() / each["size"].sum()), *interval
 
 
 def difference_intervals(
@@ -68,7 +66,7 @@ def difference_intervals(
     """
     kept = table.dropna(subset=[column])
     people = sorted(kept["participant"].unique())
-    weights = _draws(len(people), resamples, seed)
+    weights = cluster_draws(len(people), resamples, seed=seed)
     means, whole = {}, {}
     for method in methods:
         each = (
@@ -84,8 +82,3 @@ def difference_intervals(
         low, high = np.percentile(differences, [tail, 100 - tail]) if len(differences) else (np.nan, np.nan)
         found[first, second] = (float(whole[first] - whole[second]), float(low), float(high))
     return found
-
-
-def _draws(people: int, resamples: int, seed: int) -> np.ndarray:
-    """How often each participant is drawn in each resample, (resamples, people)."""
-    return np.random.default_rng(seed).multinomial(people, np.full(people, 1 / people), size=resamples).astype(float)

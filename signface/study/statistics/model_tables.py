@@ -19,12 +19,11 @@ import numpy as np
 from signface.study.extras import needed
 from signface.study.responses import Responses
 from signface.study.statistics.contingency import cochran, mcnemar
-from signface.study.statistics.corrections import holm
 from signface.study.statistics.intervals import difference_intervals
 from signface.study.statistics.mixed_models import OrdinalFit, OrdinalMixedModel
 from signface.study.statistics.rank_tests import dunn, friedman, wilcoxon
 from signface.study.statistics.tables import StudyTable
-from signface.study.statistics.test_result import TestResult
+from signface.study.statistics.test_result import TestResult, holm
 from signface.study.statistics.thesis_tables import RESULT_KINDS, paired, participant_means, result_cells
 
 if TYPE_CHECKING:

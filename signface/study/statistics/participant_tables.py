@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING
 
 from signface.study.responses import FACTORS, PERSONAL, Responses
 from signface.study.statistics.contingency import chi_square
-from signface.study.statistics.corrections import holm
 from signface.study.statistics.rank_tests import kruskal_wallis, spearman
 from signface.study.statistics.tables import StudyTable, write_cell, write_p
-from signface.study.statistics.test_result import TestResult
+from signface.study.statistics.test_result import TestResult, holm
 from signface.study.statistics.thesis_tables import RESULT_KINDS, result_cells, right_and_wrong
 
 if TYPE_CHECKING:

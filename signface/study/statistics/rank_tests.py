@@ -289,7 +289,7 @@ def dunn(groups: Sequence[ArrayLike]) -> dict[tuple[int, int], TestResult]:
     Notes
     -----
     Dunn, "Multiple comparisons using rank sums", *Technometrics* 6 (1964) 241-252. With two groups z² is exactly
-    the H of Kruskal and Wallis. Correct with `signface.study.statistics.corrections.holm`.
+    the H of Kruskal and Wallis. Correct with `signface.study.statistics.test_result.holm`.
     """
     from scipy import stats
 

@@ -3,12 +3,18 @@
 - `TestResult`: one test.
 - `untestable`: a test that could not be made, and why.
 - `verdict`: an effect size in words.
+- `holm`: p-values of several tests at once, corrected.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from signface.study.extras import needed
 
 #: name: symbol and the bounds of a small, a medium and a large effect (Cohen 1988; Tomczak and Tomczak 2014).
 EFFECTS = {
@@ -78,3 +84,32 @@ def verdict(effect_name: str, effect: float) -> str:
     if bounds is None or math.isnan(effect):
         return ""
     return ("negligible", "small", "medium", "large")[sum(abs(effect) >= bound for bound in bounds)]
+
+
+def holm(p_values: ArrayLike) -> NDArray[np.float64]:
+    """P-values corrected by Holm's step-down rule (Holm 1979), in the order given.
+
+    Parameters
+    ----------
+    p_values : array_like (m,)
+        NaN for tests that were not made: they stay NaN and are not counted.
+
+    Returns
+    -------
+    ndarray (m,)
+
+    Raises
+    ------
+    SignfaceError
+        The extra `study` is not installed.
+
+    Examples
+    --------
+    >>> holm([0.01, 0.04, 0.03, float("nan")]).round(6).tolist()
+    [0.03, 0.06, 0.06, nan]
+    """
+    corrected = np.array(p_values, float)
+    made = ~np.isnan(corrected)
+    if made.any():
+        corrected[made] = needed("statsmodels.stats.multitest").multipletests(corrected[made], method="holm")[1]
+    return corrected

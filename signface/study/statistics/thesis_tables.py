@@ -21,10 +21,9 @@ import numpy as np
 
 from signface.study.responses import FACTORS, SCALES, Responses, order_expressions
 from signface.study.statistics.contingency import chi_square
-from signface.study.statistics.corrections import holm
 from signface.study.statistics.rank_tests import kruskal_wallis, scheirer_ray_hare, wilcoxon
 from signface.study.statistics.tables import StudyTable
-from signface.study.statistics.test_result import TestResult, verdict
+from signface.study.statistics.test_result import TestResult, holm, verdict
 
 if TYPE_CHECKING:
     import pandas as pd
