@@ -96,7 +96,7 @@ def run(arguments: argparse.Namespace) -> int | None:
     """Run one action."""
     actions = {
         "check": check_files,
-        "map": write_mapping,
+        "map": map_template,
         "learn": learn_corrections,
         "agree": compare_annotators,
         "install-recogniser": install_recogniser,
@@ -107,52 +107,27 @@ def run(arguments: argparse.Namespace) -> int | None:
 
 def check_files(arguments: argparse.Namespace) -> int:
     """Name every problem of every file; exit status 2 when there is any."""
-    from signface.elan.checking import find_problems
-    from signface.elan.document import read_document
+    from signface.elan.checking import check_file
 
-    media_ms = None if arguments.duration is None else 1000 * arguments.duration
     bad = 0
     for file in arguments.files:
         try:
-            root = read_document(file).getroot()
+            result = check_file(file, media_s=arguments.duration)
         except SignfaceError as error:
             print(error)
             bad += 1
-            continue
-        problems = list(find_problems(root, media_ms=media_ms))
-        bad += bool(problems)
-        tiers = root.findall("TIER")
-        annotations = len(root.findall("TIER/ANNOTATION"))
-        state = f"{len(problems)} problem{'s' * (len(problems) != 1)}" if problems else "no problem"
-        print(f"{file}: EAF {root.get('VERSION')}, {len(tiers)} tiers, {annotations} annotations, {state}")
-        for problem in problems:
-            print(f"  {problem}")
+        else:
+            print(result)
+            bad += bool(result.problems)
     return 2 if bad else 0
 
 
-def write_mapping(arguments: argparse.Namespace) -> None:
+def map_template(arguments: argparse.Namespace) -> None:
     """Write a first mapping file."""
     from signface.channels.rules import closed_vocabularies, read_channels
-    from signface.elan.channels import vocabulary_of
-    from signface.elan.document import read_document
-    from signface.elan.mapping import suggest_mapping
-    from signface.elan.vocabularies import AFFECT, INTENSITY, Vocabulary
-    from signface.files import whole_file
+    from signface.elan.mapping import write_mapping
 
-    if arguments.output.suffix.lower() != ".toml":
-        raise SignfaceError("the ending of a mapping file is .toml", file=arguments.output)
-    if arguments.output.exists():
-        raise SignfaceError("exists", file=arguments.output, hint="name another file, or remove this one")
-    vocabularies: dict[str, Vocabulary | None] = {
-        "affect": AFFECT,
-        "affect-confidence": None,
-        "intensity": INTENSITY,
-        "affect-doubtful": AFFECT,
-    }
-    vocabularies |= {found.channel: vocabulary_of(found) for found in closed_vocabularies(read_channels())}
-    text = suggest_mapping(read_document(arguments.template).getroot(), vocabularies)
-    with whole_file(arguments.output) as temporary:
-        temporary.write_text(text, "utf-8")
+    write_mapping(arguments.template, arguments.output, channels=closed_vocabularies(read_channels()))
     print(f"{arguments.output}: written; look through it before it is used")
 
 
@@ -242,66 +217,24 @@ def _before_and_after(labels: pd.DataFrame, name: str) -> str:
 
 def compare_annotators(arguments: argparse.Namespace) -> None:
     """Print the agreement on every tier; write tables and pictures when asked."""
-    import pandas as pd
+    from signface.elan.reference import read_annotators
+    from signface.metrics.tiers import compare_tiers
 
-    from signface.elan.reference import read_tiers
-    from signface.metrics.agreement import agreement_table, confusion, frame_labels, modified_kappa
-
-    files = arguments.files
-    if len(files) < 2:
-        raise SignfaceError("agreement needs two files or more", hint="name the files of two annotators")
-    names = _names(files)
-    read = {name: read_tiers(file) for name, file in zip(names, files, strict=True)}
-    common = [tier for tier in read[names[0]] if all(tier in tiers for tiers in read.values())]
-    wanted = arguments.tier or [tier for tier in common if any(len(tiers[tier]) for tiers in read.values())]
-    missing = [tier for tier in wanted if tier not in common]
-    if missing or not wanted:
-        raise SignfaceError(
-            f"not every file has a tier {missing[0]}" if missing else "the files have no filled tier in common",
-            hint=f"tiers of all are {', '.join(common) or 'none'}",
-        )
-    tables = []
-    for tier in wanted:
-        annotators = {name: tiers[tier] for name, tiers in read.items()}
-        table = agreement_table(annotators, overlap=arguments.overlap, with_gamma=arguments.gamma)
-        table.insert(0, "tier", tier)
-        tables.append(table)
-        first, second = list(annotators.values())[:2]
-        seconds = confusion(frame_labels([first, second]))
-        print(f"{tier}")
-        shown = table.drop(columns="tier").dropna(axis=1, how="all")
-        print(shown.to_string(index=False, float_format=lambda number: f"{number:.2f}", na_rep=""))
-        print(f"seconds, {names[0]} down, {names[1]} across:")
-        print(seconds.to_string(float_format=lambda number: f"{number:.1f}" if number else "."))
+    annotators = read_annotators(arguments.files)
+    agreements = compare_tiers(annotators, tiers=arguments.tier, overlap=arguments.overlap, gamma=arguments.gamma)
+    first, second = list(annotators)[:2]
+    for agreement in agreements:
+        columns = agreement.table.drop(columns="tier").dropna(axis=1, how="all")
+        print(agreement.tier)
+        print(columns.to_string(index=False, float_format=lambda number: f"{number:.2f}", na_rep=""))
+        print(f"seconds, {first} down, {second} across:")
+        print(agreement.seconds.to_string(float_format=lambda number: f"{number:.1f}" if number else "."))
         print()
-        if arguments.output is not None:
-            _write_agreement(arguments.output, tier, annotators, seconds, modified_kappa(first, second).table)
     if arguments.output is not None:
-        from signface.files import whole_file
+        from signface.report.agreement import write_agreement
 
-        with whole_file(arguments.output / "agreement.csv") as temporary:
-            pd.concat(tables, ignore_index=True).to_csv(temporary, index=False, float_format="%.4f")
+        write_agreement(agreements, arguments.output)
         print(f"{arguments.output}: tables and pictures")
-
-
-def _write_agreement(
-    folder: Path, tier: str, annotators: dict[str, pd.DataFrame], seconds: pd.DataFrame, matches: pd.DataFrame
-) -> None:
-    from signface.files import whole_file
-    from signface.report.agreement import draw_agreement
-    from signface.report.timeline import save_figure
-
-    stem = "".join(c if c.isalnum() or c in "-_@." else "_" for c in tier)
-    for kind, table in (("seconds", seconds.round(3)), ("annotations", matches)):
-        with whole_file(folder / f"confusion_{stem}_{kind}.csv") as temporary:
-            table.to_csv(temporary)
-    save_figure(draw_agreement(annotators, seconds, title=tier), folder / f"agreement_{stem}.png")
-
-
-def _names(files: list[Path]) -> list[str]:
-    """Short names that tell the files apart: their stems, or their paths where stems are equal."""
-    stems = [file.stem for file in files]
-    return stems if len(set(stems)) == len(stems) else [str(file) for file in files]
 
 
 def install_recogniser(arguments: argparse.Namespace) -> None:

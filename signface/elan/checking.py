@@ -1,4 +1,8 @@
-"""What is wrong with an EAF: `find_problems` lists it, `check_document` refuses the document.
+"""What is wrong with an EAF.
+
+- `check_file`: what a file holds and every problem of it.
+- `find_problems`: the problems of a document that was read.
+- `check_document`: refuses a document with problems.
 
 The schema tells whether a document is well formed as an EAF; these are the faults that it cannot see or that are worth
 saying in plain words.
@@ -8,11 +12,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import pairwise
+from os import PathLike
 from pathlib import Path
 
 from lxml import etree
 
+from signface.elan.document import read_document
 from signface.errors import SignfaceError
 
 #: Attribute that identifies an element, for those whose identifiers must be unique among their like.
@@ -26,6 +33,60 @@ NAMES = {
     "LOCALE": "LANGUAGE_CODE",
     "CONSTRAINT": "STEREOTYPE",
 }
+
+
+@dataclass(frozen=True)
+class FileCheck:
+    """What an EAF holds and what is wrong with it; `print` says it for a person.
+
+    Parameters
+    ----------
+    file : Path
+    version : str
+        Of the format.
+    tiers, annotations : int
+        How many there are.
+    problems : tuple of str
+        Each as a short clause.
+    """
+
+    file: Path
+    version: str
+    tiers: int
+    annotations: int
+    problems: tuple[str, ...]
+
+    def __str__(self) -> str:
+        count = len(self.problems)
+        state = f"{count} problem{'s' * (count != 1)}" if count else "no problem"
+        line = f"{self.file}: EAF {self.version}, {self.tiers} tiers, {self.annotations} annotations, {state}"
+        return "\n  ".join([line, *self.problems])
+
+
+def check_file(path: str | PathLike[str], *, media_s: float | None = None) -> FileCheck:
+    """What an EAF holds and every problem of it.
+
+    Parameters
+    ----------
+    path : path
+    media_s : float, optional
+        Length of the film in seconds; annotations that end after it are named.
+
+    Raises
+    ------
+    SignfaceError
+        The file cannot be read as an EAF.
+
+    Examples
+    --------
+    >>> from signface.files import bundled_corpus
+    >>> check_file(bundled_corpus() / "reference" / "M1_IE_J.eaf").problems
+    ()
+    """
+    root = read_document(path).getroot()
+    problems = tuple(find_problems(root, media_ms=None if media_s is None else 1000 * media_s))
+    tiers, annotations = root.findall("TIER"), root.findall("TIER/ANNOTATION")
+    return FileCheck(Path(path), root.get("VERSION") or "", len(tiers), len(annotations), problems)
 
 
 def check_document(root: etree._Element, file: Path) -> None:

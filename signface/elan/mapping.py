@@ -12,7 +12,7 @@ A TOML file with a table for each channel:
 A channel without a table goes to a tier of ours, `CHANNEL@SIGNER`, which is added to the file.
 
 - `ChannelRule`, `Mapping`, `read_mapping`: the file as an object.
-- `suggest_mapping`: a first mapping for a template, written by `signface elan map`.
+- `write_mapping`: a first mapping file for a template; `suggest_mapping`: its text.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from __future__ import annotations
 import difflib
 import json
 import tomllib
+from collections.abc import Iterable
 from collections.abc import Mapping as MappingABC
 from dataclasses import dataclass, field
 from os import PathLike
@@ -27,8 +28,12 @@ from pathlib import Path
 
 from lxml import etree
 
-from signface.elan.vocabularies import Vocabulary
+from signface.channels.events import ChannelEvents
+from signface.elan.channels import vocabulary_of
+from signface.elan.document import read_document
+from signface.elan.vocabularies import AFFECT, INTENSITY, Vocabulary
 from signface.errors import SignfaceError
+from signface.files import whole_file
 from signface.label.vocabulary import is_transition
 
 
@@ -175,6 +180,52 @@ def suggest_mapping(root: etree._Element, vocabularies: MappingABC[str, Vocabula
                 f"{_toml_key(entry.value)} = {_toml(value or '')}" + ("" if value else "  # no like entry: left out")
             )
     return "\n".join(lines) + "\n"
+
+
+def write_mapping(
+    template: str | PathLike[str], path: str | PathLike[str], *, channels: Iterable[ChannelEvents] = ()
+) -> Path:
+    """Write a first mapping file for a lab's template, to be looked through before it is used.
+
+    Parameters
+    ----------
+    template : path
+        An `.etf` or `.eaf`.
+    path : path
+        A `.toml` that is not there yet.
+    channels : iterable of ChannelEvents
+        The further channels that are to be mapped (`signface.channels.rules.closed_vocabularies`).
+
+    Raises
+    ------
+    SignfaceError
+        The template is no EAF, the path is no `.toml`, exists, or cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> from signface.files import bundled_corpus
+    >>> file = write_mapping(bundled_corpus() / "reference" / "M1_IE_J.eaf", Path(mkdtemp()) / "mapping.toml")
+    >>> read_mapping(file)["affect"].tier
+    'affect@{signer}'
+    """
+    file = Path(path)
+    if file.suffix.lower() != ".toml":
+        raise SignfaceError("the ending of a mapping file is .toml", file=file)
+    if file.exists():
+        raise SignfaceError("exists", file=file, hint="name another file, or remove this one")
+    vocabularies: dict[str, Vocabulary | None] = {
+        "affect": AFFECT,
+        "affect-confidence": None,
+        "intensity": INTENSITY,
+        "affect-doubtful": AFFECT,
+    }
+    vocabularies |= {channel.channel: vocabulary_of(channel) for channel in channels}
+    text = suggest_mapping(read_document(template).getroot(), vocabularies)
+    with whole_file(file) as temporary:
+        temporary.write_text(text, "utf-8")
+    return file
 
 
 def _closest_tier(channel: str, tiers: list[str]) -> str | None:

@@ -1,14 +1,14 @@
 """What annotators wrote, as tables.
 
 - `read_reference`: the affect tier of a signer, as segments.
-- `read_tiers`: every independent tier.
+- `read_tiers`: every independent tier; `read_annotators`: those of several files, under short names.
 - `read_corrections`: the affect tier as signface wrote it, and as it is now.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from os import PathLike
 from pathlib import Path
@@ -112,6 +112,21 @@ def read_tiers(eaf: str | PathLike[str]) -> dict[str, pd.DataFrame]:
     rows = tier_rows(root)
     independent = [tier.get("TIER_ID") or "" for tier in root.iterfind("TIER") if tier.get("PARENT_REF") is None]
     return {name: _table([row for row in rows[name] if row[2].strip()]) for name in independent}
+
+
+def read_annotators(files: Sequence[str | PathLike[str]]) -> dict[str, dict[str, pd.DataFrame]]:
+    """The tiers (`read_tiers`) of several annotators' files of one take.
+
+    Each stands under the stem of its file, or under its path where two stems are equal.
+
+    Raises
+    ------
+    SignfaceError
+        As `read_tiers`.
+    """
+    stems = [Path(file).stem for file in files]
+    names = stems if len(set(stems)) == len(stems) else [str(file) for file in files]
+    return {name: read_tiers(file) for name, file in zip(names, files, strict=True)}
 
 
 def read_corrections(eaf: str | PathLike[str], signer: str | None = None) -> tuple[pd.DataFrame, pd.DataFrame] | None:

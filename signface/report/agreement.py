@@ -1,17 +1,63 @@
-"""A picture of agreement: the annotators' tiers above each other, and who called what what."""
+"""Agreement of annotators as files.
+
+- `write_agreement`: tables and a picture of each tier.
+- `draw_agreement`: the picture: the annotators' tiers above each other, and who called what what.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
+from signface.files import whole_file
+from signface.metrics.tiers import TierAgreement
 from signface.report.colours import colour_of, ink_on
+from signface.report.timeline import save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+def write_agreement(agreements: Sequence[TierAgreement], folder: str | PathLike[str]) -> list[Path]:
+    """Write `agreement.csv`, and for each tier two confusion tables and a picture.
+
+    Parameters
+    ----------
+    agreements : sequence of TierAgreement
+        What `signface.metrics.tiers.compare_tiers` returns.
+    folder : path
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    SignfaceError
+        The folder cannot be written.
+    """
+    files = []
+
+    def write(table: pd.DataFrame, name: str, **how: Any) -> None:
+        files.append(Path(folder) / name)
+        with whole_file(files[-1]) as temporary:
+            table.to_csv(temporary, **how)
+
+    for agreement in agreements:
+        stem = "".join(c if c.isalnum() or c in "-_@." else "_" for c in agreement.tier)
+        write(agreement.seconds.round(3), f"confusion_{stem}_seconds.csv")
+        write(agreement.annotations, f"confusion_{stem}_annotations.csv")
+        files.append(Path(folder) / f"agreement_{stem}.png")
+        save_figure(draw_agreement(agreement.annotators, agreement.seconds, title=agreement.tier), files[-1])
+    tables = pd.concat([agreement.table for agreement in agreements], ignore_index=True)
+    write(tables, "agreement.csv", index=False, float_format="%.4f")
+    return files
 
 
 def draw_agreement(annotators: Mapping[str, pd.DataFrame], seconds: pd.DataFrame, *, title: str = "") -> Figure:

@@ -23,6 +23,7 @@ from signface.metrics.agreement import (
     match_annotations,
     modified_kappa,
 )
+from signface.metrics.tiers import compare_tiers
 
 
 def table(*rows) -> pd.DataFrame:
@@ -175,3 +176,13 @@ def test_gamma_is_below_one_for_others_and_the_same_for_one_seed():
     found = gamma([ONE, OTHER], seed=1)
     assert found < 1.0
     assert found == gamma([ONE, OTHER], seed=1)
+
+
+def test_tiers_that_not_everybody_has_are_no_comparison():
+    table = pd.DataFrame({"start_s": [0.0], "end_s": [1.0], "label": ["N"]})
+    both = {"eva": {"affect": table, "brows": table}, "tom": {"affect": table}}
+    assert [agreement.tier for agreement in compare_tiers(both)] == ["affect"]
+    with pytest.raises(SignfaceError, match="not every file has a tier brows"):
+        compare_tiers(both, tiers=["brows"])
+    with pytest.raises(SignfaceError, match="two files or more"):
+        compare_tiers({"eva": both["eva"]})
