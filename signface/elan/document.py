@@ -259,7 +259,7 @@ def recorded(root: etree._Element) -> dict[str, list[Row]]:
 
     A record that cannot be read (someone edited it) is left out, so that its tier counts as the annotator's.
     """
-    found = {}
+    records = {}
     for element in root.findall("HEADER/PROPERTY"):
         name = element.get("NAME") or ""
         if not name.startswith(WRITTEN_PREFIX):
@@ -268,8 +268,8 @@ def recorded(root: etree._Element) -> dict[str, list[Row]]:
             rows = [(row[0], row[1], str(row[2])) for row in json.loads(element.text or "")]
         except (ValueError, TypeError, IndexError, KeyError):
             continue
-        found[name[len(WRITTEN_PREFIX) :]] = rows
-    return found
+        records[name[len(WRITTEN_PREFIX) :]] = rows
+    return records
 
 
 def tier_rows(root: etree._Element) -> dict[str, list[Row]]:

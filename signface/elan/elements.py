@@ -176,7 +176,7 @@ def vocabulary_element(vocabulary: Vocabulary, name: str) -> etree._Element:
 def add_media(header: etree._Element, video: str | PathLike[str], file: Path) -> None:
     """MEDIA_DESCRIPTOR with absolute and relative URL, unless the header has it."""
     absolute, relative = link_urls(video, file)
-    if any(found.get("MEDIA_URL") == absolute for found in header.iterfind("MEDIA_DESCRIPTOR")):
+    if any(media.get("MEDIA_URL") == absolute for media in header.iterfind("MEDIA_DESCRIPTOR")):
         return
     element = etree.Element("MEDIA_DESCRIPTOR", MEDIA_URL=absolute)
     header.insert(len(header.findall("MEDIA_DESCRIPTOR")), element)
@@ -188,7 +188,7 @@ def add_media(header: etree._Element, video: str | PathLike[str], file: Path) ->
 def add_link(header: etree._Element, linked: str | PathLike[str], file: Path) -> None:
     """LINKED_FILE_DESCRIPTOR: `.xml` as text/xml, anything else as text/plain; unless the header has it."""
     absolute, relative = link_urls(linked, file)
-    if any(found.get("LINK_URL") == absolute for found in header.iterfind("LINKED_FILE_DESCRIPTOR")):
+    if any(link.get("LINK_URL") == absolute for link in header.iterfind("LINKED_FILE_DESCRIPTOR")):
         return
     element = etree.Element("LINKED_FILE_DESCRIPTOR", LINK_URL=absolute)
     header.insert(len(header.findall("MEDIA_DESCRIPTOR")) + len(header.findall("LINKED_FILE_DESCRIPTOR")), element)

@@ -231,9 +231,9 @@ def write_mapping(
 def _closest_tier(channel: str, tiers: list[str]) -> str | None:
     """The tier whose name holds a word of the channel; the shortest of several."""
     for word in (channel, *CHANNEL_WORDS.get(channel, ())):
-        found = sorted((tier for tier in tiers if word in tier.lower()), key=lambda tier: (len(tier), tier))
-        if found:
-            return found[0]
+        named = sorted((tier for tier in tiers if word in tier.lower()), key=lambda tier: (len(tier), tier))
+        if named:
+            return named[0]
     return None
 
 

@@ -41,7 +41,7 @@ from signface.errors import SignfaceError
 
 
 @dataclass
-class _Placement:
+class _Target:
     """Where one channel goes: the tier (there or to be made) and the values as the lab writes them."""
 
     channel: str
@@ -87,24 +87,24 @@ def put_tiers(
     """
     before = tier_rows(root)
     written = recorded(root)
-    groups: list[tuple[Tier, list[_Placement]]] = []
+    groups: list[tuple[Tier, list[_Target]]] = []
     for tier in tiers:
-        placements = _plan(root, tier, mapping or {}, file)
-        if placements:
-            groups.append((tier, placements))
-    names = [placement.tier_id for _, group in groups for placement in group]
+        targets = _plan(root, tier, mapping or {}, file)
+        if targets:
+            groups.append((tier, targets))
+    names = [target.tier_id for _, group in groups for target in group]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise SignfaceError(f"two channels are mapped to the tier {twice[0]}", file=file)
     changed = []
     for tier, group in groups:
-        if all(placement.element is not None and before[placement.tier_id] == placement.rows for placement in group):
+        if all(target.element is not None and before[target.tier_id] == target.rows for target in group):
             continue
-        for placement in group:
-            current = before.get(placement.tier_id, [])
-            if current and not replace and written.get(placement.tier_id) != current:
+        for target in group:
+            current = before.get(target.tier_id, [])
+            if current and not replace and written.get(target.tier_id) != current:
                 raise SignfaceError(
-                    f"the tier {placement.tier_id} holds annotations that signface did not write or that were "
+                    f"the tier {target.tier_id} holds annotations that signface did not write or that were "
                     "corrected since",
                     file=file,
                     hint="keep them and leave the tier out of the mapping, or overwrite them with --replace",
@@ -116,9 +116,9 @@ def put_tiers(
     fresh_id = fresh_ids(root)
     slots = TimeSlots(fresh_id)
     for _, group in changed:
-        for placement in group:
-            if placement.element is not None:
-                _empty(root, placement.element)
+        for target in group:
+            if target.element is not None:
+                _empty(root, target.element)
     for tier, group in changed:
         _write(root, tier, group, slots, fresh_id)
     order = root.find("TIME_ORDER")
@@ -126,44 +126,44 @@ def put_tiers(
     set_property(root, "lastUsedAnnotationId", str(last_annotation_number(root)))
     after = tier_rows(root)
     for _, group in changed:
-        for placement in group:
-            set_property(root, WRITTEN_PREFIX + placement.tier_id, written_record(after[placement.tier_id]))
-            if placement.tier_id.partition("@")[0] != placement.channel or placement.labels:
-                meaning = {"channel": placement.channel, "labels": placement.labels}
-                set_property(root, CHANNEL_PREFIX + placement.tier_id, json.dumps(meaning, ensure_ascii=False))
+        for target in group:
+            set_property(root, WRITTEN_PREFIX + target.tier_id, written_record(after[target.tier_id]))
+            if target.tier_id.partition("@")[0] != target.channel or target.labels:
+                meaning = {"channel": target.channel, "labels": target.labels}
+                set_property(root, CHANNEL_PREFIX + target.tier_id, json.dumps(meaning, ensure_ascii=False))
     return True
 
 
-def _plan(root: etree._Element, tier: Tier, mapping: Mapping, file: Path) -> list[_Placement]:
-    """Placements of a tier and its dependents, the aligned one first; empty when the mapping leaves it out."""
-    parent = _place(root, tier.channel, tier, tier.values, tier.vocabulary, None, mapping, file)
+def _plan(root: etree._Element, tier: Tier, mapping: Mapping, file: Path) -> list[_Target]:
+    """Targets of a tier and its dependents, the aligned one first; empty when the mapping leaves it out."""
+    parent = _target(root, tier.channel, tier, tier.values, tier.vocabulary, None, mapping, file)
     if parent is None:
         return []
     group = [parent]
     for child in tier.dependents:
-        placement = _place(root, child.channel, tier, child.values, child.vocabulary, parent, mapping, file)
-        if placement is not None:
-            group.append(placement)
+        target = _target(root, child.channel, tier, child.values, child.vocabulary, parent, mapping, file)
+        if target is not None:
+            group.append(target)
     return group
 
 
-def _place(
+def _target(
     root: etree._Element,
     channel: str,
     tier: Tier,
     labels: Sequence[str | None],
     vocabulary: Vocabulary | None,
-    parent: _Placement | None,
+    parent: _Target | None,
     mapping: Mapping,
     file: Path,
-) -> _Placement | None:
+) -> _Target | None:
     rule = mapping.get(channel) or ChannelRule(tier_name(channel, tier.signer))
     if not rule.tier:
         return None
     tier_id = rule.tier.replace("{signer}", clean_name(tier.signer))
-    element = next((found for found in root.iterfind("TIER") if found.get("TIER_ID") == tier_id), None)
+    element = next((other for other in root.iterfind("TIER") if other.get("TIER_ID") == tier_id), None)
     if element is None and channel in mapping:
-        names = ", ".join(found.get("TIER_ID") or "" for found in root.iterfind("TIER"))
+        names = ", ".join(other.get("TIER_ID") or "" for other in root.iterfind("TIER"))
         raise SignfaceError(
             f"has no tier {tier_id}, to which the mapping sends {channel}", file=file, hint=f"its tiers are {names}"
         )
@@ -202,7 +202,7 @@ def _place(
     ]
     if element is None:
         entries = {entry.value: entry.identifier for entry in vocabulary.entries} if vocabulary else {}
-    return _Placement(
+    return _Target(
         channel,
         tier_id,
         element,
@@ -221,14 +221,18 @@ def _meaning(labels: Sequence[str | None], values: Sequence[str | None]) -> dict
     for label, value in zip(labels, values):
         if label is not None and value is not None:
             stands_for.setdefault(value, set()).add(label)
-    return {value: next(iter(found)) for value, found in stands_for.items() if len(found) == 1 and found != {value}}
+    return {value: next(iter(ours)) for value, ours in stands_for.items() if len(ours) == 1 and ours != {value}}
 
 
-def _refuse_losses(root: etree._Element, group: list[_Placement], file: Path) -> None:
+def _refuse_losses(root: etree._Element, group: list[_Target], file: Path) -> None:
     """Refuse when annotations of others hang on, or link to, those that would be rewritten."""
-    own = {placement.tier_id for placement in group}
+    names = {target.tier_id for target in group}
     for child in root.iterfind("TIER"):
-        if child.get("PARENT_REF") in own and child.get("TIER_ID") not in own and child.find("ANNOTATION") is not None:
+        if (
+            child.get("PARENT_REF") in names
+            and child.get("TIER_ID") not in names
+            and child.find("ANNOTATION") is not None
+        ):
             raise SignfaceError(
                 f"the tier {child.get('TIER_ID')} hangs on {child.get('PARENT_REF')} and would lose its annotations",
                 file=file,
@@ -236,9 +240,9 @@ def _refuse_losses(root: etree._Element, group: list[_Placement], file: Path) ->
             )
     going = {
         annotation.get("ANNOTATION_ID")
-        for placement in group
-        if placement.element is not None
-        for annotation in placement.element.iterfind("ANNOTATION/*")
+        for target in group
+        if target.element is not None
+        for annotation in target.element.iterfind("ANNOTATION/*")
     }
     for link in root.iterfind("REF_LINK_SET/*"):
         targets = {link.get("REF1"), link.get("REF2"), *(link.get("REFS") or "").split()}
@@ -265,58 +269,58 @@ def _empty(root: etree._Element, tier: etree._Element) -> None:
 
 
 def _write(
-    root: etree._Element, tier: Tier, group: list[_Placement], slots: TimeSlots, fresh_id: Callable[[str], str]
+    root: etree._Element, tier: Tier, group: list[_Target], slots: TimeSlots, fresh_id: Callable[[str], str]
 ) -> None:
     """Make the tiers that are missing, with their types and vocabularies, and fill them all."""
     parent = group[0]
     identifiers: list[str | None] = []
-    for placement in group:
-        if placement.element is None:
-            placement.element = tier_element(
-                placement.tier_id, _type(root, placement), tier.signer, None if placement.aligned else parent.tier_id
+    for target in group:
+        if target.element is None:
+            target.element = tier_element(
+                target.tier_id, _type(root, target), tier.signer, None if target.aligned else parent.tier_id
             )
-            insert_in_order(root, placement.element)
-        if placement.aligned:
+            insert_in_order(root, target.element)
+        if target.aligned:
             made = aligned_annotations(
-                placement.element, tier.start_ms, tier.end_ms, placement.values, placement.entries, slots, fresh_id
+                target.element, tier.start_ms, tier.end_ms, target.values, target.entries, slots, fresh_id
             )
-            identifiers = made if placement is parent else identifiers
+            identifiers = made if target is parent else identifiers
         else:
-            dependent_annotations(placement.element, identifiers, placement.values, placement.entries, fresh_id)
+            dependent_annotations(target.element, identifiers, target.values, target.entries, fresh_id)
 
 
-def _type(root: etree._Element, placement: _Placement) -> str:
+def _type(root: etree._Element, target: _Target) -> str:
     """Name of a linguistic type for a tier of ours; it and its vocabulary are added unless the like is there."""
-    wanted = type_element(placement.channel, _vocabulary(root, placement), dependent=not placement.aligned)
+    wanted = type_element(target.channel, _vocabulary(root, target), dependent=not target.aligned)
     existing = {kind.get("LINGUISTIC_TYPE_ID"): kind for kind in root.iterfind("LINGUISTIC_TYPE")}
-    for name in (placement.channel, f"{placement.channel} (signface)"):
+    for name in (target.channel, f"{target.channel} (signface)"):
         kind = existing.get(name)
         if kind is None:
             wanted.set("LINGUISTIC_TYPE_ID", name)
             insert_in_order(root, wanted)
-            if not placement.aligned:
+            if not target.aligned:
                 _constraint(root, "Symbolic_Association")
             return name
         if all(kind.get(key) == wanted.get(key) for key in ("CONSTRAINTS", "CONTROLLED_VOCABULARY_REF")):
             return name
-    raise SignfaceError(f"has linguistic types named {placement.channel} of another kind", hint="rename them in ELAN")
+    raise SignfaceError(f"has linguistic types named {target.channel} of another kind", hint="rename them in ELAN")
 
 
-def _vocabulary(root: etree._Element, placement: _Placement) -> str | None:
+def _vocabulary(root: etree._Element, target: _Target) -> str | None:
     """Name of the vocabulary for a tier of ours; it is added unless one with all its entries is there."""
-    vocabulary = placement.vocabulary
+    vocabulary = target.vocabulary
     if vocabulary is None:
         return None
     existing = {cv.get("CV_ID"): cv for cv in root.iterfind("CONTROLLED_VOCABULARY")}
     for name in (vocabulary.name, f"{vocabulary.name} (signface)"):
-        found = existing.get(name)
-        if found is None:
+        element = existing.get(name)
+        if element is None:
             language = next((e for e in root.iterfind("LANGUAGE") if e.get("LANG_ID") == LANGUAGE["LANG_ID"]), None)
             if language is None:
                 insert_in_order(root, etree.Element("LANGUAGE", LANGUAGE))
             insert_in_order(root, vocabulary_element(vocabulary, name))
             return name
-        entries = {entry.get("CVE_ID") for entry in found.iterfind("CV_ENTRY_ML")}
+        entries = {entry.get("CVE_ID") for entry in element.iterfind("CV_ENTRY_ML")}
         if entries >= {entry.identifier for entry in vocabulary.entries}:
             return name
     raise SignfaceError(f"has vocabularies named {vocabulary.name} of another kind", hint="rename them in ELAN")

@@ -60,10 +60,10 @@ def write_preferences(
                 colour.text = ",".join(str(part) for part in entry.colour or ())
     if curves is not None:
         drawn = panels(curves)
-        number = etree.SubElement(root, "pref", key="TimeSeriesViewer.NumberOfPanels")
-        etree.SubElement(number, "Int").text = str(len(drawn))
-        for place, names in enumerate(drawn.values(), start=1):
-            tracks = etree.SubElement(root, "prefList", key=f"TimeSeriesViewer.Panel-{place}")
+        count = etree.SubElement(root, "pref", key="TimeSeriesViewer.NumberOfPanels")
+        etree.SubElement(count, "Int").text = str(len(drawn))
+        for number, names in enumerate(drawn.values(), start=1):
+            tracks = etree.SubElement(root, "prefList", key=f"TimeSeriesViewer.Panel-{number}")
             for name in names:
                 etree.SubElement(tracks, "String").text = name
     write_document(etree.ElementTree(root), file)

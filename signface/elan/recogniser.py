@@ -44,7 +44,7 @@ TEXTS = (
 )
 
 #: Where ELAN keeps its extensions, below its own folder, on Linux, macOS and Windows.
-PLACES = ("lib/app/extensions", "Contents/app/extensions", "app/extensions", "extensions")
+EXTENSIONS = ("lib/app/extensions", "Contents/app/extensions", "app/extensions", "extensions")
 
 SHELL = """#!/bin/sh
 # Started by ELAN, without PATH and in the C locale.
@@ -84,11 +84,11 @@ def extensions_folder(elan: str | PathLike[str]) -> Path:
     folder = Path(elan)
     if folder.name == "extensions" and folder.is_dir():
         return folder
-    for place in PLACES:
-        if (folder / place).is_dir():
-            return folder / place
-        if (folder / place).parent.is_dir() and place != "extensions":
-            return folder / place  # a new ELAN has the folder only once something is in it
+    for subfolder in EXTENSIONS:
+        if (folder / subfolder).is_dir():
+            return folder / subfolder
+        if (folder / subfolder).parent.is_dir() and subfolder != "extensions":
+            return folder / subfolder  # a new ELAN has the folder only once something is in it
     raise SignfaceError(
         "holds no ELAN", file=folder, hint="name the folder that has lib/app, app or Contents/app in it"
     )
@@ -115,7 +115,7 @@ def write_extension(folder: str | PathLike[str], *, python: str | None = None) -
         The folder cannot be written.
     """
     program = sys.executable if python is None else python
-    place = Path(folder)
+    extension = Path(folder)
     quoted = "'" + program.replace("'", "'\\''") + "'"
     contents = {
         "recognizer.cmdi": etree.tostring(cmdi(), xml_declaration=True, encoding="UTF-8", pretty_print=True),
@@ -125,10 +125,10 @@ def write_extension(folder: str | PathLike[str], *, python: str | None = None) -
     }
     written = []
     for name, content in contents.items():
-        with whole_file(place / name) as temporary:
+        with whole_file(extension / name) as temporary:
             temporary.write_bytes(content)
-        written.append(place / name)
-    script = place / "signface.sh"
+        written.append(extension / name)
+    script = extension / "signface.sh"
     script.chmod(script.stat().st_mode | stat.S_IXUSR | stat.S_IXGRP | stat.S_IXOTH)
     return written
 

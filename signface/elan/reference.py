@@ -153,7 +153,7 @@ def read_corrections(eaf: str | PathLike[str], signer: str | None = None) -> tup
 
 def channel_labels(root: etree._Element) -> dict[str, tuple[str, dict[str, str]]]:
     """For each of a lab's tiers that signface wrote to: the channel, and our label for each of the lab's values."""
-    found = {}
+    labels_of = {}
     for element in root.iterfind("HEADER/PROPERTY"):
         name = element.get("NAME") or ""
         if not name.startswith(CHANNEL_PREFIX):
@@ -161,10 +161,10 @@ def channel_labels(root: etree._Element) -> dict[str, tuple[str, dict[str, str]]
         try:
             content = json.loads(element.text or "")
             labels = {str(value): str(label) for value, label in content["labels"].items()}
-            found[name[len(CHANNEL_PREFIX) :]] = (str(content["channel"]), labels)
+            labels_of[name[len(CHANNEL_PREFIX) :]] = (str(content["channel"]), labels)
         except (ValueError, KeyError, TypeError, AttributeError):
             continue  # edited by someone: the tier is then read as any other
-    return found
+    return labels_of
 
 
 def _table(rows: Iterable[Row]) -> pd.DataFrame:
@@ -208,12 +208,12 @@ def _affect_tier_name(root: etree._Element, signer: str | None, file: Path) -> s
     affect = [name for name in tiers if name == "affect" or name.startswith("affect@")]
     there = f"its tiers are {', '.join(list(tiers)[:12]) or 'none'}"
     if signer:
-        own = [name for name in labs if tiers[name].get("PARTICIPANT") == clean_name(signer)]
+        theirs = [name for name in labs if tiers[name].get("PARTICIPANT") == clean_name(signer)]
         for wanted in (tier_name("affect", signer), "affect"):
             if wanted in affect:
                 return wanted
-        if len(own) == 1 or len(labs) == 1:
-            return (own or labs)[0]
+        if len(theirs) == 1 or len(labs) == 1:
+            return (theirs or labs)[0]
         raise SignfaceError(f"no tier affect@{signer} or affect", file=file, hint=there)
     if "affect" in affect:
         return "affect"

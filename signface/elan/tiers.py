@@ -132,13 +132,13 @@ def affect_tier(segments: Segments, signer: str = "", *, vocabulary: Vocabulary 
     dependents = []
     if "confidence" in table.columns:
         numbers = table["confidence"].to_numpy(float)
-        shown = tuple(f"{number:.2f}" if np.isfinite(number) else None for number in numbers)
-        dependents.append(DependentTier("affect-confidence", shown))
+        texts = tuple(f"{number:.2f}" if np.isfinite(number) else None for number in numbers)
+        dependents.append(DependentTier("affect-confidence", texts))
     if "intensity" in table.columns:
         numbers = table["intensity"].to_numpy(float)
-        shown = tuple(f"{number:g}" if np.isfinite(number) else None for number in numbers)
-        INTENSITY.check([value for value in shown if value is not None], f"{segments.name}: intensity")
-        dependents.append(DependentTier("intensity", shown, INTENSITY))
+        texts = tuple(f"{number:g}" if np.isfinite(number) else None for number in numbers)
+        INTENSITY.check([value for value in texts if value is not None], f"{segments.name}: intensity")
+        dependents.append(DependentTier("intensity", texts, INTENSITY))
     labels = tuple(str(label) for label in table["label"])
     return Tier("affect", signer, start_ms, end_ms, labels, vocabulary, tuple(dependents))
 

@@ -69,9 +69,9 @@ class Vocabulary:
         """
         outside = sorted(set(values) - set(self.values))
         if outside:
-            shown = ", ".join(repr(value) for value in outside[:5])
+            listed = ", ".join(repr(value) for value in outside[:5])
             raise SignfaceError(
-                f"{where}: {shown} not in the closed vocabulary {self.name}",
+                f"{where}: {listed} not in the closed vocabulary {self.name}",
                 hint=f"it holds {', '.join(self.values[:12])}{' ...' if len(self.values) > 12 else ''}",
             )
 
