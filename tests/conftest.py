@@ -1,25 +1,26 @@
-"""What tests of several rooms share: real data beside the checkout, the bundled takes, the default face."""
+"""What tests of several rooms share: files of others, the bundled takes, the default face."""
 
 from pathlib import Path
 
 import pytest
 
+from tests.fixtures.third_party import FILES, FOLDER, absent, third_party_file
+
 REPOSITORY = Path(__file__).resolve().parents[1]
-DATA = REPOSITORY.parent / "shared" / "data"
 
 
-def data_file(name: str) -> Path:
-    """A third-party file that lies beside the checkout; the test is skipped where it is absent."""
-    file = DATA / name
-    if not file.is_file():
-        pytest.skip(f"{name} is not here")
-    return file
+def pytest_terminal_summary(terminalreporter):
+    """Say once what was not tested for want of a file."""
+    if names := absent():
+        terminalreporter.section("files of others that are not here: tests that need them were skipped")
+        for name in names:
+            terminalreporter.line(f"{FOLDER / name}: {FILES[name][1]}")
 
 
 @pytest.fixture(scope="session")
 def signer_pose() -> Path:
     """A real signer: MediaPipe landmarks of a clip of the public DGS corpus."""
-    return data_file("dgs_example.pose")
+    return third_party_file("dgs_example.pose")
 
 
 @pytest.fixture(scope="session")
@@ -27,7 +28,7 @@ def eaf_schema():
     """ELAN's schema of EAF 3.0."""
     from lxml import etree
 
-    return etree.XMLSchema(etree.parse(str(data_file("EAFv3.0.xsd"))))
+    return etree.XMLSchema(etree.parse(str(third_party_file("EAFv3.0.xsd"))))
 
 
 @pytest.fixture(scope="session")

@@ -5,12 +5,7 @@ import pytest
 
 from signface.face.checking import check_face
 from signface.face.layout_files import choose_layout, read_layout
-from signface.face.reading import read_face, read_identities, read_parts
-
-
-@pytest.fixture(scope="module")
-def face():
-    return read_face("default")
+from signface.face.reading import read_identities, read_parts
 
 
 def test_the_default_face_is_one_clean_skin(face):

@@ -2,7 +2,6 @@
 
 import contextlib
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,8 +15,7 @@ from signface.face.mesh import Mesh
 from signface.face.model import FaceModel
 from signface.face.reading import find_unit, read_face
 from signface.files import shipped
-
-DATA = Path(__file__).parents[3] / "shared/data"
+from tests.fixtures.third_party import third_party_file
 
 
 def mask() -> FaceModel:
@@ -90,9 +88,8 @@ def test_a_folder_must_say_which_shape_is_the_neutral(tmp_path):
     assert read_face(tmp_path, neutral="rest0").names == ("smile",)
 
 
-@pytest.mark.skipif(not (DATA / "candide3.wfm").exists(), reason="needs the CANDIDE face")
 def test_candide_gives_animation_units_as_bases_and_shape_units_as_identities():
-    face = read_face(DATA / "candide3.wfm")
+    face = read_face(third_party_file("candide3.wfm"))
     assert len(face.mesh.vertices) == 113
     assert face.names[3] == "Jaw drop"
     assert face.identity_names[0] == "Head height"

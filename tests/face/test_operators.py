@@ -5,13 +5,7 @@ import pytest
 
 from signface.face.layout_files import read_layout
 from signface.face.operators import stiffness_and_mass, thin_shell_matrices
-from signface.face.reading import read_face
 from signface.face.subdivision import subdivide
-
-
-@pytest.fixture(scope="module")
-def face():
-    return read_face("default")
 
 
 def test_the_laplacian_knows_no_constants_is_symmetric_and_never_negative(face):

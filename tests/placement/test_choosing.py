@@ -8,23 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from signface.errors import SignfaceError
-from signface.face.reading import read_face
 from signface.placement.choosing import METHODS, Material, choose, unseen_bases
 from signface.placement.clusters import trajectories
 from signface.placement.evaluation import skin_metric
 from signface.placement.selection import Reconstruction, ThinShell
 from signface.placement.sites import Rules
-from signface.synth.actors import draw_actors
-
-
-@pytest.fixture(scope="module")
-def face():
-    return read_face("default")
-
-
-@pytest.fixture(scope="module")
-def actors(face):
-    return draw_actors(face, 2, seconds=12.0, seed=5)
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,6 @@ import pytest
 from signface.cli.main import main
 from signface.errors import SignfaceError
 from signface.face.layout_files import read_layout
-from signface.face.reading import read_face
 from signface.placement.empirical import place_layout
 from signface.placement.evaluation import error_map, evaluate_layout, skin_metric
 from signface.placement.findings import against, flattening
@@ -17,16 +16,6 @@ from signface.placement.layout_study import Plan, load_cell, save_cell
 from signface.render.layout_sheet import distances, numbering
 from signface.solver.rivals.gaussian_process import GaussianProcess, SparseOnlineGaussianProcess
 from signface.synth.actors import Virtual, draw_actors
-
-
-@pytest.fixture(scope="module")
-def face():
-    return read_face("default")
-
-
-@pytest.fixture(scope="module")
-def actors(face):
-    return draw_actors(face, 2, seconds=12.0, seed=5)
 
 
 def test_the_skin_metric_is_the_error_of_eq_3_5(face):

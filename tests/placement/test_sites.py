@@ -11,15 +11,10 @@ import pytest
 from signface.errors import SignfaceError
 from signface.face.layout_files import read_layout, write_layout
 from signface.face.mesh import Mesh
-from signface.face.reading import read_face, read_identities
+from signface.face.reading import read_identities
 from signface.placement.empirical import EMPIRICAL, find_landmarks, place_layout
 from signface.placement.sites import Board, Rules, find_sites, forbidden
 from signface.synth.heads import draw_head
-
-
-@pytest.fixture(scope="module")
-def face():
-    return read_face("default")
 
 
 @pytest.fixture(scope="module")

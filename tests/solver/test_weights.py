@@ -15,7 +15,6 @@ from signface.face.layout import MarkerLayout
 from signface.face.layout_files import read_layout
 from signface.face.mesh import Mesh
 from signface.face.model import FaceModel
-from signface.face.reading import read_face
 from signface.face.subdivision import subdivide
 from signface.solver.bounds import AT_REST, SMOOTHING, holding_curvature, holding_energy, holding_slope, released
 from signface.solver.methods import METHODS, make_solver
@@ -24,11 +23,6 @@ from signface.solver.thin_shell import ThinShellSolver
 
 #: The methods that solve for weights, and those that learn the mapping from examples.
 EXACT = ("thin-shell", "least-squares", "nnls", "bounded", "direct-shell")
-
-
-@pytest.fixture(scope="module")
-def face() -> FaceModel:
-    return read_face("default")
 
 
 @pytest.fixture(scope="module")
