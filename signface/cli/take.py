@@ -6,11 +6,6 @@ import argparse
 import json
 from typing import Any
 
-import numpy as np
-
-from signface.descriptors import Descriptors
-from signface.takes.take import Take
-
 EXAMPLE = "  signface take info take.c3d\n  signface take info recordings/*.c3d --json"
 
 
@@ -44,69 +39,6 @@ class _ListFormats(argparse.Action):
             endings = f" ({', '.join(format.endings)})" if format.endings else ""
             print(f"{format.name:10} {format.title}{endings}: {format.holds}; written by {format.written_by}")
         parser.exit()
-
-
-def _recognised(take: Take, face_name: str) -> dict[str, Any]:
-    """The shipped layout that fits the take's labels best, and which of its markers the take has."""
-    from signface.errors import SignfaceError
-    from signface.face.layout_files import choose_layout
-    from signface.face.reading import read_face
-    from signface.takes.labels import match_labels
-
-    face = read_face(face_name)
-    try:
-        layout = choose_layout(take.labels, face)
-    except SignfaceError as error:
-        return {"layout": None, "face_markers": 0, "head_markers": [], "missing": [], "note": error.problem}
-    found = match_labels(take.labels, layout.labels)
-    return {
-        "layout": layout.name,
-        "face_markers": sum(1 for label in layout.face_labels if label in found),
-        "head_markers": [label for label in layout.head_labels if label in found],
-        "missing": [label for label in layout.labels if label not in found],
-    }
-
-
-def describe_take(take: Take, *, face: str = "default") -> dict[str, Any]:
-    """What a take holds, as plain values: the content of `signface take info --json`."""
-    from signface.takes.gaps import gap_runs
-
-    gaps = {}
-    for label, stretches in gap_runs(take).items():
-        if len(stretches):
-            lengths = np.diff(stretches, axis=1).ravel()
-            gaps[label] = {
-                "gaps": len(lengths),
-                "missing_s": round(float(lengths.sum()) / take.rate, 6),
-                "longest_s": round(float(lengths.max()) / take.rate, 6),
-            }
-    return {
-        "name": take.name,
-        "kind": "markers",
-        "frames": take.n_frames,
-        "rate_hz": take.rate,
-        "duration_s": round(take.duration, 6),
-        "start_s": take.start,
-        "unit_found": next((entry.removeprefix("unit ") for entry in take.history if entry.startswith("unit")), "mm"),
-        "markers": list(take.labels),
-        "gaps": gaps,
-        **_recognised(take, face),
-        "history": list(take.history),
-    }
-
-
-def describe_weights(weights: Descriptors) -> dict[str, Any]:
-    """What a file of weights holds, as plain values."""
-    return {
-        "name": weights.name,
-        "kind": "weights",
-        "frames": weights.n_frames,
-        "rate_hz": weights.rate,
-        "duration_s": round(weights.duration, 6),
-        "start_s": weights.start,
-        "bases": list(weights.names),
-        "history": list(weights.history),
-    }
 
 
 def _shortened(words: list[str], most: int = 12) -> str:
@@ -146,13 +78,19 @@ def _report(file: str, content: dict[str, Any]) -> str:
 
 def run(arguments: argparse.Namespace) -> int:
     """Describe each take; 0 unless one cannot be read."""
+    from signface.face.reading import read_face
+    from signface.solver.recognition import recognise_layout
+    from signface.takes.description import describe_take, describe_weights
     from signface.takes.reading import read_recording
+    from signface.takes.take import Take
 
     described = []
     for file in arguments.takes:
         recording = read_recording(file, unit=arguments.unit)
         if isinstance(recording, Take):
-            content = describe_take(recording, face=arguments.face)
+            content = describe_take(recording)
+            history = content.pop("history")
+            content |= {**recognise_layout(recording, read_face(arguments.face)), "history": history}
         else:
             content = describe_weights(recording)
         if arguments.json:

@@ -1,0 +1,41 @@
+"""`recognise_layout`: which shipped layout the markers of a take are, and which of its markers the take has."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from signface.errors import SignfaceError
+from signface.face.layout_files import choose_layout
+from signface.face.model import FaceModel
+from signface.takes.labels import match_labels
+from signface.takes.take import Take
+
+
+def recognise_layout(take: Take, face: FaceModel) -> dict[str, Any]:
+    """The shipped layout that fits a take's labels best, as plain values for a report.
+
+    Returns
+    -------
+    dict
+        `layout` (its name, or None where none fits, and then a `note` why), `face_markers` (how many of them the take
+        has), `head_markers` (which), `missing` (markers of the layout that the take has not).
+
+    Examples
+    --------
+    >>> from signface.face.reading import read_face
+    >>> from signface.files import bundled_corpus
+    >>> from signface.takes.reading import read_take
+    >>> recognise_layout(read_take(bundled_corpus() / "M1_IE_J.c3d"), read_face("default"))["missing"]
+    []
+    """
+    try:
+        layout = choose_layout(take.labels, face)
+    except SignfaceError as error:
+        return {"layout": None, "face_markers": 0, "head_markers": [], "missing": [], "note": error.problem}
+    present = match_labels(take.labels, layout.labels)
+    return {
+        "layout": layout.name,
+        "face_markers": sum(1 for label in layout.face_labels if label in present),
+        "head_markers": [label for label in layout.head_labels if label in present],
+        "missing": [label for label in layout.labels if label not in present],
+    }
