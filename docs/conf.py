@@ -49,6 +49,8 @@ toc_object_entries = False
 
 html_theme = "furo"
 html_title = "signface"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sphinx = False
 

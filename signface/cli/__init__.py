@@ -1,0 +1,1 @@
+"""The command `signface`: a module a command, which parses, calls a function and prints."""

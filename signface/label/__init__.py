@@ -1,0 +1,1 @@
+"""Labels of segments: trained models, on disk and at work."""

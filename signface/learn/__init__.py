@@ -1,0 +1,1 @@
+"""Training: examples, settings, tuning and calibration of the classifiers."""

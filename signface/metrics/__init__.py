@@ -1,0 +1,1 @@
+"""Measures on plain tables: segmentation, classification, agreement."""

@@ -1,0 +1,1 @@
+"""Pictures and films of faces, without a display."""

@@ -1,0 +1,1 @@
+"""Figures and pages: what was found and measured, to look at."""

@@ -1,0 +1,1 @@
+"""Signers who do not exist: heads, expressions, motion and markers of synthetic corpora."""

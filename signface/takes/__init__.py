@@ -1,0 +1,1 @@
+"""Recordings of markers: read, named, cleaned, filtered and freed from the head's motion."""

@@ -1,0 +1,1 @@
+"""Formats of faces: glTF, folders of OBJ, CANDIDE."""

@@ -1,0 +1,1 @@
+"""Other ways to solve, to compare with."""

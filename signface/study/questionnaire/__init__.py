@@ -1,0 +1,1 @@
+"""The questionnaire of a perceptual study, in the browser."""
