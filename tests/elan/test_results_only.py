@@ -113,3 +113,27 @@ def test_the_digest_of_options_follows_the_content_of_their_files(tmp_path):
     assert options.changed(mapping=str(tmp_path / "same.toml")).digest == before
     file.write_text('[affect]\ntier = "B"\n')
     assert options.digest != before
+
+
+def test_the_script_of_the_manual_runs(mini, tmp_path, monkeypatch, capsys):
+    text = (Path(__file__).parents[2] / "docs" / "elan.md").read_text("utf-8")
+    script = text.partition("```python\n")[2].partition("```")[0]
+    (tmp_path / "take.c3d").write_bytes(mini.takes[0].path.read_bytes())
+    (tmp_path / "eva.eaf").write_bytes(mini.takes[0].annotation.read_bytes())
+    monkeypatch.chdir(tmp_path)
+    exec(compile(script, "docs/elan.md", "exec"), {"__name__": "script"})
+    assert "eva.eaf: EAF 3.0" in capsys.readouterr().out
+
+
+def test_a_channel_of_ones_own_is_written_as_any_other(annotation, tmp_path):
+    import dataclasses
+
+    import pandas as pd
+
+    from signface.channels.events import ChannelEvents
+
+    table = pd.DataFrame({"start_s": [0.5], "end_s": [1.0], "value": ["mm"]})
+    mouthing = ChannelEvents("mouthing", "Mouthings", {"mm": "effortless"}, table)
+    more = dataclasses.replace(annotation, channels={**annotation.channels, "mouthing": mouthing})
+    sf.write_eaf(more, tmp_path / "take.eaf")
+    assert sf.read_tiers(tmp_path / "take.eaf")["mouthing@M1"].values.tolist() == [[0.5, 1.0, "mm"]]
