@@ -27,6 +27,7 @@ from signface.label.labellers import NAMES, SEQUENCE_NAMES
 from signface.label.model import Card
 from signface.label.persistence import save_model
 from signface.label.vocabulary import AFFECTS
+from signface.learn.settings import TrainingSettings
 from signface.learn.training import Example, train_model
 
 FOLDER = Path(__file__).resolve().parent / "classifiers"
@@ -71,7 +72,7 @@ def build(name: str, train: list[Example], test: list[Example]) -> None:
     classifier, kinds = SHIPPED[name]
     model = train_model(
         [example for example in train if example.kind in kinds],
-        classifier=classifier,
+        TrainingSettings(classifier=classifier, calibrate=False),
         face="default",
         layout="default-40",
         corpus="synthetic (signface synth)",

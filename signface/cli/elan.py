@@ -163,6 +163,7 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
 
     from signface.label.persistence import load_model, save_model
     from signface.learn.relearning import held_out_labels
+    from signface.learn.settings import TrainingSettings
     from signface.learn.training import train_model
 
     def solved(folder: Path) -> list:
@@ -170,6 +171,7 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
         count = sum(entry.annotation is not None for entry in own)
         return solve_examples(own, progress=lambda items: progress(items, "solving", total=count))
 
+    settings = TrainingSettings(classifier=arguments.classifier, seed=arguments.seed, calibrate=False)
     before = load_model(arguments.before)
     corrected = solved(arguments.corpus)
     known_names = {example.take.rpartition("/")[2] for example in corrected}
@@ -180,7 +182,7 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
     others = apart
     scores = {}
     if len(corrected) > 1:
-        labels = held_out_labels(corrected, before, others=others, classifier=arguments.classifier, seed=arguments.seed)
+        labels = held_out_labels(corrected, before, settings, others=others)
         print(_before_and_after(labels, before.name))
         scores = {"accuracy on corrected takes held out": float((labels["after"] == labels["label"]).mean())}
         if (labels["after"] == labels["label"]).mean() < (labels["before"] == labels["label"]).mean():
@@ -192,8 +194,7 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
         print("one take cannot be held out of itself: no comparison")
     model = train_model(
         [*corrected, *others],
-        classifier=arguments.classifier,
-        seed=arguments.seed,
+        settings,
         face="default",
         layout="chosen by markers",
         corpus=" + ".join(folder.resolve().name for folder in (arguments.corpus, *arguments.others)),

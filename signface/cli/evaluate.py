@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from signface.cli.options import add_face_arguments
 from signface.cli.progress import progress
-from signface.cli.train import add_training_arguments, training_options, words
+from signface.cli.train import add_training_arguments, training_settings, words
 from signface.errors import SignfaceError
 from signface.label.labellers import NAMES, SEQUENCE_NAMES
-
-if TYPE_CHECKING:
-    from signface.learn.examples import Example
-    from signface.segmentation.segments import Segments
 
 EXAMPLE = """  signface evaluate corpora/feel -o reports/feel
   signface evaluate corpora/feel -o reports/feel --train-kinds IE,SE,EU --protocol across --classifiers net-hsmm"""
@@ -84,6 +77,7 @@ def run(arguments: argparse.Namespace) -> None:
     from signface.corpus.examples import solve_examples
     from signface.corpus.facts import corpus_facts
     from signface.corpus.manifest import read_corpus
+    from signface.evaluation.measure import measure
     from signface.face.reading import read_face
     from signface.report.evaluation.evaluated import Evaluated
     from signface.report.evaluation.report import write_report
@@ -94,102 +88,33 @@ def run(arguments: argparse.Namespace) -> None:
             f"there is no classifier named {unknown[0]}" if unknown else "no classifier is named",
             hint=f"choose among {', '.join(NAMES | SEQUENCE_NAMES)}",
         )
-    training = {**training_options(arguments), "calibrate": arguments.calibrate}
+    settings = training_settings(arguments)
     if arguments.output.exists() and not arguments.output.is_dir():
         raise SignfaceError("is a file, not a folder", file=arguments.output, hint="name a folder for the report")
     whole = read_corpus(arguments.corpus)
     corpus = whole.select(kinds=[*arguments.train_kinds, *arguments.test_kinds])
-    protocols = [arguments.protocol] if arguments.protocol else ["within", "across"]
-    if len(corpus.signers) < 2 and not arguments.protocol:
-        protocols = ["within"]
     examples = solve_examples(
         corpus,
         face=arguments.face,
         layout=arguments.layout,
         progress=lambda items: progress(items, "solving", total=sum(t.annotation is not None for t in corpus)),
     )
-    metrics, found = measure(
+    metrics, segments = measure(
         examples,
-        protocols,
-        arguments.train_kinds,
-        arguments.test_kinds,
-        arguments.seed,
+        settings,
+        protocols=[arguments.protocol] if arguments.protocol else None,
+        train_kinds=arguments.train_kinds,
+        test_kinds=arguments.test_kinds,
         classifiers=arguments.classifiers,
-        training=training,
         curves_of=arguments.classifiers if arguments.learning_curve else None,
+        progress=progress,
     )
     facts = corpus_facts(corpus, face=arguments.face, layout=arguments.layout)
     metrics["corpus"] = facts
     face = read_face(arguments.face) if facts["faces"] else None
-    page = write_report(Evaluated(metrics, facts, examples, found, face, arguments.date), arguments.output)
+    page = write_report(Evaluated(metrics, facts, examples, segments, face, arguments.date), arguments.output)
     print_results(metrics)
     print(f"report: {page}")
-
-
-def measure(
-    examples: list[Example],
-    protocols: list[str],
-    train_kinds: list[str],
-    test_kinds: list[str],
-    seed: int,
-    *,
-    classifiers: Sequence[str] = tuple(NAMES),
-    training: Mapping[str, Any] | None = None,
-    curves_of: Sequence[str] | None = None,
-) -> tuple[dict, dict[str, dict[str, dict[str, Segments]]]]:
-    """The content of metrics.json, and what was found by protocol, classifier and take.
-
-    `classifiers` holds the first protocol; a second one stands under `also`, by its name.
-    """
-    from signface.evaluation.details import details
-    from signface.evaluation.protocol import evaluate, folds_of
-    from signface.segmentation.cutting import segment
-
-    segments = {e.take: segment(e.descriptors) for e in examples}
-    metrics: dict = {}
-    evaluations, all_folds = {}, {}
-    for protocol in protocols:
-        folds = folds_of(examples, protocol=protocol, train_kinds=train_kinds, test_kinds=test_kinds)
-        shown = partial(progress, what=f"evaluating {protocol}")
-        found = evaluate(
-            folds, classifiers=classifiers, seed=seed, segments=segments, training=training, progress=shown
-        )
-        evaluations[protocol], all_folds[protocol] = found, folds
-        description = {
-            "name": protocol,
-            "train_kinds": train_kinds,
-            "test_kinds": test_kinds,
-            "seed": seed,
-            "training": dict(training or {}),
-            "folds": [
-                {
-                    "signer": fold.signer,
-                    "train_takes": [example.take for example in fold.train],
-                    "test_takes": [example.take for example in fold.test],
-                    "trained": trained,
-                    "classifiers": found.by_signer[fold.signer],
-                }
-                for fold, trained in zip(folds, found.trained, strict=True)
-            ],
-        }
-        if not metrics:
-            metrics = {**found.metrics, "protocol": description}
-        else:
-            metrics.setdefault("also", {})[protocol] = {
-                **{key: value for key, value in found.metrics.items() if key != "segmentation"},
-                "protocol": description,
-            }
-    metrics |= details(
-        evaluations,
-        all_folds,
-        examples,
-        segments,
-        curves_of=curves_of,
-        training=training,
-        seed=seed,
-        progress=lambda steps, what: progress(steps, what),
-    )
-    return metrics, {protocol: found.found for protocol, found in evaluations.items()}
 
 
 def print_results(metrics: dict) -> None:
@@ -218,13 +143,13 @@ def print_results(metrics: dict) -> None:
             scores = {name: sections["manual_segments"][key] for name, sections in part["classifiers"].items()}
             print(f"{what}, {title}: {', '.join(f'{name} {number(score)}' for name, score in scores.items())}")
         for how, scores in part.get("intensity", {}).items():
-            told = ", ".join(f"{what} {number(scores[key])}" for key, what in INTENSITY.items())
-            print(f"intensity, {how}, {title}: {told}")
+            numbers = ", ".join(f"{what} {number(scores[key])}" for key, what in INTENSITY.items())
+            print(f"intensity, {how}, {title}: {numbers}")
     print()
     cut = metrics["segmentation"]
     f1 = ", ".join(f"{value:.2f} within {tolerance} s" for tolerance, value in cut["boundary_f1"].items())
     print(f"segments: boundary F1 {f1}; mean IoU {cut['mean_iou']:.2f}; frame agreement {cut['frame_agreement']:.2f}")
     for part in (metrics, *metrics.get("also", {}).values()):
-        for name, own in part["segmentation_by_classifier"].items():
-            f1 = ", ".join(f"{value:.2f} within {tolerance} s" for tolerance, value in own["boundary_f1"].items())
+        for name, scores in part["segmentation_by_classifier"].items():
+            f1 = ", ".join(f"{value:.2f} within {tolerance} s" for tolerance, value in scores["boundary_f1"].items())
             print(f"segments of {name}, {PROTOCOL_TITLES[part['protocol']['name']]}: boundary F1 {f1}")

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from signface.cli.options import add_face_arguments
 from signface.cli.progress import progress
 from signface.errors import SignfaceError
 from signface.label.labellers import NAMES, SEQUENCE_NAMES
+
+if TYPE_CHECKING:
+    from signface.learn.settings import TrainingSettings
 
 EXAMPLE = """  signface train corpora/feel -o mine.skops
   signface train corpora/feel -o mine.skops --classifier svm-rbf --kinds IE,SE --signer each
@@ -48,13 +52,12 @@ def add_training_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def training_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """What `signface.learn.training.train_model` is told of `add_training_arguments`; names are checked."""
-    from signface.label.variants import DescriptorVariant
+def training_settings(arguments: argparse.Namespace) -> TrainingSettings:
+    """The settings that a command was given, of `add_training_arguments`, `--classifier`, `--calibrate`, `--seed`."""
+    from signface.learn.settings import TrainingSettings
 
-    DescriptorVariant(arguments.features, arguments.normalise).check()
-    names = ("features", "normalise", "aggregate", "balanced", "search")
-    return {name: getattr(arguments, name) for name in names}
+    names = [item.name for item in fields(TrainingSettings) if hasattr(arguments, item.name)]
+    return TrainingSettings(**{name: getattr(arguments, name) for name in names})
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -90,7 +93,7 @@ def run(arguments: argparse.Namespace) -> None:
     output = arguments.output
     if output.suffix.lower() != ".skops":
         raise SignfaceError("the ending of a classifier is .skops", file=output)
-    options = training_options(arguments)
+    settings = training_settings(arguments)
     whole = read_corpus(arguments.corpus)
     one = None if arguments.signer in ("all", "each") else [arguments.signer]
     corpus = whole.select(kinds=arguments.kinds, signers=one)
@@ -116,10 +119,7 @@ def run(arguments: argparse.Namespace) -> None:
     for file, group in groups.items():
         model = train_model(
             group,
-            classifier=arguments.classifier,
-            seed=arguments.seed,
-            calibrate=arguments.calibrate,
-            **options,
+            settings,
             face=Path(arguments.face).name,
             layout="chosen by markers" if arguments.layout is None else Path(arguments.layout).name,
             corpus=whole.folder.resolve().name,

@@ -15,10 +15,10 @@ import pandas as pd
 
 from signface.evaluation.importance import can_be_judged, permutation_importance
 from signface.evaluation.learning_curve import learning_curve, remembering
-from signface.evaluation.protocol import Evaluation, Fold
+from signface.evaluation.protocol import UNCALIBRATED, Evaluation, Fold
 from signface.label.labellers import NAMES
-from signface.label.model import TrainedModel
 from signface.learn.examples import Example
+from signface.learn.settings import TrainingSettings
 from signface.learn.training import train_model
 from signface.metrics.segmentation import segmentation_metrics
 from signface.segmentation.segments import Segments
@@ -51,12 +51,12 @@ def segmentation_by_kind(
         Protocol (empty for the energies), method and kind to what `segmentation_metrics` gives.
     """
     methods: dict[tuple[str, str], Mapping[str, Segments]] = {("", ENERGIES): segments}
-    methods |= {(protocol, name): own for protocol, names in found.items() for name, own in names.items()}
+    methods |= {(protocol, name): takes for protocol, names in found.items() for name, takes in names.items()}
     scores: dict[str, dict[str, dict[str, dict]]] = {}
-    for (protocol, method), own in methods.items():
-        kinds = sorted({example.kind for example in examples if example.take in own})
+    for (protocol, method), takes in methods.items():
+        kinds = sorted({example.kind for example in examples if example.take in takes})
         for kind in kinds:
-            pairs = [(e.reference.table, own[e.take].table) for e in examples if e.kind == kind and e.take in own]
+            pairs = [(e.reference.table, takes[e.take].table) for e in examples if e.kind == kind and e.take in takes]
             scores.setdefault(protocol, {}).setdefault(method, {})[kind] = segmentation_metrics(pairs)
     return scores
 
@@ -71,10 +71,9 @@ def details(
     folds: Mapping[str, Sequence[Fold]],
     examples: Sequence[Example],
     segments: Mapping[str, Segments],
+    settings: TrainingSettings = UNCALIBRATED,
     *,
     curves_of: Sequence[str] | None = None,
-    training: Mapping[str, Any] | None = None,
-    seed: int = 0,
     progress: Callable[[Iterable, str], Iterable] = lambda items, what: items,
 ) -> dict[str, Any]:
     """Segmentation by kind, learning curves, the importance of bases and reliability, as plain values.
@@ -86,12 +85,11 @@ def details(
     examples : sequence of Example
     segments : mapping of str to Segments
         What the energies find.
+    settings : TrainingSettings
+        Those of the evaluation. Nothing is searched again: importance is asked of the parameters that were chosen,
+        learning curves are drawn with the settings' own.
     curves_of : sequence of str, optional
         Classifiers with a learning curve; those of the thesis by default, since sequence models train for minutes.
-    training : mapping, optional
-        What was evaluated (`signface.evaluation.protocol.evaluate`). Nothing is searched again: importance is asked of
-        the parameters that were chosen, learning curves are drawn with the classifiers' own.
-    seed : int
     progress : callable, optional
         Wraps the steps of each protocol's curve, with words for what is done.
 
@@ -103,13 +101,8 @@ def details(
         - `importance`: classifier to a list of groups of bases, for the main protocol;
         - `reliability`: protocol and classifier to share right by confidence.
     """
-    told = dict(training or {}, search=False, calibrate=False)
+    plain = settings.changed(search=False, calibrate=False)
     train = remembering()
-
-    def trained(takes: Sequence[Example], *, classifier: str, **options: Any) -> TrainedModel:
-        own = {key: value for key, value in told.items() if key != "features" or classifier in NAMES}
-        return train(takes, classifier=classifier, **own, **options)
-
     found = {protocol: evaluation.found for protocol, evaluation in evaluations.items()}
     result: dict[str, Any] = {"segmentation_by_kind": segmentation_by_kind(examples, segments, found)}
     curves: dict[str, list] = {}
@@ -117,29 +110,29 @@ def details(
     for protocol, evaluation in evaluations.items():
         scores = evaluation.metrics["classifiers"]
         drawn = [name for name in scores if (name in NAMES if curves_of is None else name in curves_of)]
-        searched = (training or {}).get("search", False)
         if drawn:
             signers = max(len({example.signer for example in fold.train}) for fold in folds[protocol])
             curve = learning_curve(
                 folds[protocol],
+                plain,
                 classifiers=drawn,
                 by="signers" if signers > 1 else "takes",
-                whole={} if searched else {name: scores[name]["manual_segments"]["accuracy"] for name in drawn},
-                seed=seed,
-                train=trained,
+                whole={} if settings.search else {name: scores[name]["manual_segments"]["accuracy"] for name in drawn},
+                train=train,
                 progress=lambda steps, protocol=protocol: progress(steps, f"learning curve {protocol}"),  # type: ignore[misc]
             )
             curves[protocol] = _records(curve)
         if importance or protocol != next(iter(evaluations)):
             continue
         for name in [name for name in scores if name in NAMES]:
-            chosen = [own[name]["parameters"] for own in evaluation.trained]
             models = [
-                train_model(fold.train, classifier=name, seed=seed, parameters=own, name=name, **told)
-                for fold, own in zip(folds[protocol], chosen, strict=True)
+                train_model(
+                    fold.train, plain.for_classifier(name).changed(parameters=trained[name]["parameters"]), name=name
+                )
+                for fold, trained in zip(folds[protocol], evaluation.trained, strict=True)
             ]
             if all(map(can_be_judged, models)):
-                importance[name] = _records(permutation_importance(folds[protocol], models, seed=seed))
+                importance[name] = _records(permutation_importance(folds[protocol], models, seed=settings.seed))
     reliable = {protocol: reliability(evaluation.tables) for protocol, evaluation in evaluations.items()}
     return result | {"learning_curve": curves, "importance": importance, "reliability": reliable}
 
@@ -161,14 +154,14 @@ def reliability(tables: Mapping[str, Mapping[str, pd.DataFrame]]) -> dict[str, l
     for name, sections in tables.items():
         judged = sections["automatic_segments"]
         judged = judged[judged["truth"] != ""]
-        place = (judged["confidence"].astype(float) * BINS).clip(0, BINS - 1).astype(int)
+        bins = (judged["confidence"].astype(float) * BINS).clip(0, BINS - 1).astype(int)
         curves[name] = [
             {
-                "confidence": float(own["confidence"].mean()),
-                "accuracy": float((own["truth"] == own["found"]).mean()),
-                "n": len(own),
+                "confidence": float(rows["confidence"].mean()),
+                "accuracy": float((rows["truth"] == rows["found"]).mean()),
+                "n": len(rows),
             }
-            for _, own in judged.groupby(place)
+            for _, rows in judged.groupby(bins)
         ]
     return curves
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from zlib import crc32
 
 import numpy as np
@@ -17,16 +17,15 @@ from sklearn.utils.parallel import Parallel, delayed
 
 from signface.errors import SignfaceError
 from signface.evaluation.importance import can_be_judged
+from signface.evaluation.protocol import UNCALIBRATED, Fold
 from signface.label.labelling import label_spans
 from signface.label.model import TrainedModel
 from signface.label.spans import segment_means
-from signface.learn.examples import Example
+from signface.learn.examples import Example, in_order
+from signface.learn.settings import TrainingSettings
 from signface.learn.training import train_model
 from signface.segmentation.segments import Segments
 from signface.signer import signer_level
-
-if TYPE_CHECKING:
-    from signface.evaluation.protocol import Fold
 
 #: Training takes that one classifier may be trained on in all, over the whole curve: what bounds its time.
 MOST_TAKES = 400
@@ -40,13 +39,13 @@ POINTS = 6
 
 def learning_curve(
     folds: Sequence[Fold],
+    settings: TrainingSettings = UNCALIBRATED,
     *,
     classifiers: Sequence[str],
     by: str = "takes",
     whole: Mapping[str, float] | None = None,
     draws: int = 3,
     most_takes: int = MOST_TAKES,
-    seed: int = 0,
     train: Callable[..., TrainedModel] = train_model,
     progress: Callable[[Iterable], Iterable] = iter,
 ) -> pd.DataFrame:
@@ -59,6 +58,8 @@ def learning_curve(
     Parameters
     ----------
     folds : sequence of Fold
+    settings : TrainingSettings
+        How every classifier is trained, but that nothing is searched or calibrated. Its seed is that of the orders too.
     classifiers : sequence of str
     by : str
         `takes` or `signers`: what grows. With `signers`, a signer comes with all their takes.
@@ -69,10 +70,8 @@ def learning_curve(
     most_takes : int
         Takes that one classifier may be trained on over the whole curve; fewer orders are drawn, at least one, so that
         this is kept. With very many takes, points are left out.
-    seed : int
-        Of the orders and of the classifiers.
     train : callable, optional
-        Trains a model, as `train_model` does, from examples, `classifier`, `seed` and `name`.
+        Trains a model, as `train_model` does, from examples, settings and `name`.
     progress : callable, optional
         Wraps the list of steps, to show how far it is.
 
@@ -86,10 +85,11 @@ def learning_curve(
     if by not in ("takes", "signers"):
         raise ValueError(f"what grows is takes or signers, not {by}")
     most = max(len(_units(fold, by)) for fold in folds)
-    orders = [_orders(fold, by, draws, seed) for fold in folds]
+    orders = [_orders(fold, by, draws, settings.seed) for fold in folds]
     sizes, drawn = _plan(folds, by, _sizes(most), draws, most_takes)
     n = sum(len(example.stable) for fold in folds for example in fold.test)
     known = whole or {}
+    plain = settings.changed(search=False, calibrate=False)
     steps = [
         (name, size, draw)
         for name in classifiers
@@ -102,24 +102,23 @@ def learning_curve(
             return known[name]
         parts = [[example for unit in order[draw][:size] for example in unit] for order in orders]
         try:
-            models = [train(part, classifier=name, seed=seed, name=name) for part in parts]
+            models = [train(part, plain.for_classifier(name), name=name) for part in parts]
         except SignfaceError:  # they show one expression only
             return None
         return sum(_hits(fold, model) for fold, model in zip(folds, models, strict=True)) / n if n else float("nan")
 
     # Threads: most of the time is spent in compiled code, which lets go of Python's lock.
-    found = Parallel(n_jobs=WORKERS, prefer="threads", return_as="generator")(delayed(judged)(*step) for step in steps)
-    shares = zip(progress(steps), found)
+    accuracies = Parallel(n_jobs=WORKERS, prefer="threads", return_as="generator")(
+        delayed(judged)(*step) for step in steps
+    )
+    shares = zip(progress(steps), accuracies)
     rows = [(*step[:1], by, *step[1:], share, n) for step, share in shares if share is not None]
     return pd.DataFrame(rows, columns=["classifier", "by", "size", "draw", "accuracy", "n"])
 
 
 def _units(fold: Fold, by: str) -> list[list[Example]]:
     """What is drawn: each training take, or all training takes of each signer."""
-    ordered = [
-        replace(example, reference=_without_intensity(example.reference))
-        for example in sorted(fold.train, key=lambda example: (example.signer, example.kind, example.take))
-    ]
+    ordered = [replace(example, reference=_without_intensity(example.reference)) for example in in_order(fold.train)]
     if by == "takes":
         return [[example] for example in ordered]
     signers = sorted({example.signer for example in ordered})
@@ -167,13 +166,15 @@ def _hits(fold: Fold, model: TrainedModel) -> int:
     for example in fold.test:
         spans = example.stable[["start_s", "end_s"]].to_numpy(float)
         truth = example.stable["label"].to_numpy(object)
-        own = segment_means(model.seen(example.descriptors, level), spans) if can_be_judged(model) else None
-        if own is not None and np.isfinite(own).all():  # the confidence, which takes the longest, is not wanted here
-            means.append(own)
+        of_take = segment_means(model.seen(example.descriptors, level), spans) if can_be_judged(model) else None
+        if (
+            of_take is not None and np.isfinite(of_take).all()
+        ):  # the confidence, which takes the longest, is not wanted here
+            means.append(of_take)
             truths.append(truth)
         elif len(spans):
-            found = np.array(label_spans(example.descriptors, spans, model, level=level)[0], dtype=object)
-            right += int((found == truth).sum())
+            labels = np.array(label_spans(example.descriptors, spans, model, level=level)[0], dtype=object)
+            right += int((labels == truth).sum())
     if sum(map(len, means)):
         estimator: Any = model.estimator
         right += int((estimator.predict(np.concatenate(means)) == np.concatenate(truths)).sum())
@@ -187,10 +188,10 @@ def remembering(train: Callable[..., TrainedModel] = train_model) -> Callable[..
     """
     trained: dict[tuple, TrainedModel] = {}
 
-    def remembered(examples: Sequence[Example], **options: Any) -> TrainedModel:
-        key = (frozenset(example.take for example in examples), repr(sorted(options.items())))
+    def remembered(examples: Sequence[Example], settings: TrainingSettings, **names: str) -> TrainedModel:
+        key = (frozenset(example.take for example in examples), settings.digest)
         if key not in trained:
-            trained[key] = train(examples, **options)
+            trained[key] = train(examples, settings, **names)
         return trained[key]
 
     return remembered

@@ -2,6 +2,7 @@
 
 - `PROTOCOLS`: what is trained on what.
 - `folds_of`: training and test takes of each signer.
+- `UNCALIBRATED`: the settings of a plain evaluation.
 - `evaluate`: every classifier on every fold, on reference segments, automatic segments and frames.
 - `score_model`: the same for one model that is trained already.
 """
@@ -12,7 +13,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -28,6 +28,7 @@ from signface.label.vocabulary import AFFECTS
 from signface.learn.examples import Example, signer_levels
 from signface.learn.folds import groups_of, inner_folds
 from signface.learn.ordinal import ordinal_metrics
+from signface.learn.settings import TrainingSettings
 from signface.learn.training import train_model
 from signface.metrics.classification import accuracy_interval, classification_metrics, mcnemar
 from signface.metrics.segmentation import segmentation_metrics
@@ -46,6 +47,9 @@ FRAMES_RATE = 25.0
 
 #: Turns in which a signer's takes are tested, where their kind is trained on as well.
 TURNS = 5
+
+#: How classifiers are trained where nothing else is wanted: calibration trains each of them six times.
+UNCALIBRATED = TrainingSettings(calibrate=False)
 
 #: What stands for a transition when the whole annotation is compared.
 TRANSITION = "transition"
@@ -176,12 +180,11 @@ def _turns(signer: str, train: Sequence[Example], test: Sequence[Example], turns
 
 def evaluate(
     folds: Sequence[Fold],
+    settings: TrainingSettings = UNCALIBRATED,
     *,
     classifiers: Sequence[str] = tuple(NAMES),
-    seed: int = 0,
-    segments: dict[str, Segments] | None = None,
-    training: Mapping[str, Any] | None = None,
-    progress: Callable[[Sequence[tuple[Fold, str]]], Iterable[tuple[Fold, str]]] = iter,
+    segments: Mapping[str, Segments] | None = None,
+    progress: Callable[[Sequence[tuple[int, str]]], Iterable[tuple[int, str]]] = iter,
 ) -> Evaluation:
     """Train every classifier on every fold and compare what it says with the reference.
 
@@ -201,17 +204,14 @@ def evaluate(
     Parameters
     ----------
     folds : sequence of Fold
+    settings : TrainingSettings
+        How every classifier is trained; `classifier` itself is not looked at. Its seed is that of the bootstrap too.
     classifiers : sequence of str
         Names of `NAMES` and `SEQUENCE_NAMES` of `signface.label.labellers`.
-    seed : int
-        Seed of the classifiers and of the bootstrap.
-    segments : dict of Segments, optional
+    segments : mapping of Segments, optional
         Automatic segments of test takes by name, where they are known already.
-    training : mapping, optional
-        What else `signface.learn.training.train_model` is told: `features`, `normalise`, `search`, `calibrate` and so
-        on. Sequence models, which make their own features, are not told of `features`.
     progress : callable, optional
-        Wraps the list of steps, to show how far it is.
+        Wraps the list of steps (number of the fold, classifier), to show how far it is.
 
     Returns
     -------
@@ -228,13 +228,12 @@ def evaluate(
     own: dict[str, list[tuple[pd.DataFrame, pd.DataFrame]]] = {name: [] for name in classifiers}
     annotated: dict[str, dict[str, Segments]] = {name: {} for name in classifiers}
     trained: list[dict[str, dict]] = [{} for _ in folds]
-    levels = [signer_levels(fold.test) if (training or {}).get("normalise") == "signer" else {} for fold in folds]
+    levels = [signer_levels(fold.test) if settings.normalise == "signer" else {} for fold in folds]
     strengths: list[pd.DataFrame] = []
-    place = {id(fold): number for number, fold in enumerate(folds)}
-    for fold, name in progress([(fold, name) for fold in folds for name in classifiers]):
-        number = place[id(fold)]
-        told = {key: value for key, value in (training or {}).items() if key != "features" or name in NAMES}
-        model = train_model(fold.train, classifier=name, seed=seed, name=name, **told)
+    steps = [(number, name) for number in range(len(folds)) for name in classifiers]
+    for number, name in progress(steps):
+        fold = folds[number]
+        model = train_model(fold.train, settings.for_classifier(name), name=name)
         card = model.card
         trained[number][name] = {
             "parameters": dict(card.parameters),
@@ -258,7 +257,7 @@ def evaluate(
     test = [example for fold in folds for example in fold.test]
     metrics: dict = {
         "segmentation": segmentation_metrics((e.reference.table, known[e.take].table) for e in test),
-        "classifiers": {name: _scores(sections, seed) for name, sections in pooled.items()},
+        "classifiers": {name: _scores(sections, settings.seed) for name, sections in pooled.items()},
     }
     metrics["segmentation_by_classifier"] = {name: segmentation_metrics(pairs) for name, pairs in own.items() if pairs}
     if strengths:
@@ -266,7 +265,7 @@ def evaluate(
     metrics["mcnemar"] = _mcnemar({name: sections["manual_segments"] for name, sections in pooled.items()})
     by_signer = {
         signer: {
-            name: _scores({key: table[table.signer == signer] for key, table in sections.items()}, seed)
+            name: _scores({key: table[table.signer == signer] for key, table in sections.items()}, settings.seed)
             for name, sections in pooled.items()
         }
         for signer in dict.fromkeys(fold.signer for fold in folds)

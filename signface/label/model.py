@@ -21,13 +21,6 @@ if TYPE_CHECKING:
     from signface.label.intensity import IntensityClassifier
 
 
-#: How a segment gets its label. name: what it is.
-AGGREGATES = {
-    "mean": "the label of the segment's mean descriptor (thesis, eq. 4.6)",
-    "frames": "the label with the highest mean log probability over the segment's frames",
-}
-
-
 @dataclass(frozen=True)
 class Card:
     """What a model is and where it comes from; it can be read without loading the estimator.
@@ -53,7 +46,7 @@ class Card:
     features, normalise :
         Descriptor variant that it sees (`signface.label.variants.DescriptorVariant`).
     aggregate : str
-        How a segment gets its label: a name of `AGGREGATES`.
+        How a segment gets its label: a name of `signface.label.choices.AGGREGATES`.
     balanced : bool
         Whether every label weighed the same in training.
     parameters : mapping
@@ -63,6 +56,10 @@ class Card:
         is not calibrated.
     version : str
         Version of signface that trained it.
+    training, solve : mapping
+        Settings it was trained with, and its takes were solved with, as plain values
+        (`signface.learn.settings.TrainingSettings`, `signface.solver.settings.SolveSettings`); empty in the cards of
+        old versions.
     """
 
     classifier: str
@@ -84,6 +81,8 @@ class Card:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     calibration: Mapping[str, float] = field(default_factory=dict)
     version: str = ""
+    training: Mapping[str, Any] = field(default_factory=dict)
+    solve: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 """Variants of the descriptor that a classifier can be trained on, beside the weights as they are.
 
-- `FEATURES`, `NORMALISATIONS`: what there is to choose from.
-- `DescriptorVariant`: a choice of them, as a transformer of takes.
+- `DescriptorVariant`: a choice of features and of a normalisation, as a transformer of takes.
 """
 
 from __future__ import annotations
@@ -15,21 +14,9 @@ from sklearn.base import BaseEstimator, TransformerMixin
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.frames import Means
+from signface.label.choices import FEATURES, NORMALISATIONS
 from signface.segmentation.energy import bridged
 from signface.signer import SignerLevel, signer_level
-
-#: name: what it is.
-FEATURES = {
-    "weights": "the weights",
-    "derivatives": "how fast each weight changes, 1/s",
-    "windows": "mean and standard deviation of each weight over the second around the frame",
-}
-
-#: name: what it is.
-NORMALISATIONS = {
-    "none": "weights as they are",
-    "signer": "weights less the signer's mean, over their spread",
-}
 
 #: Width of the windows, seconds.
 WINDOW_S = 1.0
@@ -51,9 +38,9 @@ class DescriptorVariant(TransformerMixin, BaseEstimator):
     Parameters
     ----------
     features : sequence of str
-        Names of `FEATURES`, in the order of the columns.
+        Names of `signface.label.choices.FEATURES`, in the order of the columns.
     normalise : str
-        A name of `NORMALISATIONS`.
+        A name of `signface.label.choices.NORMALISATIONS`.
 
     Examples
     --------

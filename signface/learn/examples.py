@@ -3,6 +3,7 @@
 - `Example`: a solved take with its reference annotation.
 - `training_frames`: the frames of one that a classifier learns from.
 - `frame_table`: those of many, with the take and the signer of each, for scikit-learn.
+- `in_order`: takes in an order that does not depend on the corpus's.
 - `signer_levels`: what each signer's weights are normalised by.
 """
 
@@ -162,6 +163,11 @@ def common_bases(examples: Sequence[Example]) -> tuple[str, ...]:
                 hint="train on takes of one face",
             )
     return first.descriptors.names
+
+
+def in_order(examples: Sequence[Example]) -> list[Example]:
+    """The takes by signer, kind and name, so that a training does not depend on their order."""
+    return sorted(examples, key=lambda example: (example.signer, example.kind, example.take))
 
 
 def signer_levels(examples: Sequence[Example]) -> dict[str, SignerLevel]:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from signface.learn.examples import Example
+from signface.learn.examples import Example, in_order
 
 
 def groups_of(examples: Sequence[Example], *, by_signer: bool | None = None) -> list[str]:
@@ -53,7 +53,7 @@ def inner_folds(
     """
     from sklearn.model_selection import StratifiedGroupKFold
 
-    ordered = sorted(examples, key=lambda example: (example.signer, example.kind, example.take))
+    ordered = in_order(examples)
     held = [example for example in ordered if len(example.stable)]
     groups = np.array(groups_of(held, by_signer=by_signer), dtype=object)
     folds = min(folds, len(set(groups)))
@@ -61,13 +61,13 @@ def inner_folds(
         return []
     labels = [example.stable["label"].to_numpy(str) for example in held]
     item = np.repeat(np.arange(len(held)), [len(part) for part in labels])
-    said = np.concatenate(labels)
-    folds = min(folds, int(np.unique(said, return_counts=True)[1].max()))
+    spread = np.concatenate(labels)
+    folds = min(folds, int(np.unique(spread, return_counts=True)[1].max()))
     if folds < 2:
         return []
     with warnings.catch_warnings():  # a label with fewer segments than folds is left out of some, which is as it is
         warnings.simplefilter("ignore", UserWarning)
-        splits = [rows for _, rows in StratifiedGroupKFold(folds).split(item[:, None], said, groups[item])]
+        splits = [rows for _, rows in StratifiedGroupKFold(folds).split(item[:, None], spread, groups[item])]
     pairs = []
     for rows in splits:
         out = set(item[rows].tolist())

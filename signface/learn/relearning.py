@@ -13,17 +13,17 @@ import pandas as pd
 from signface.errors import SignfaceError
 from signface.label.labelling import label_spans
 from signface.label.model import TrainedModel
-from signface.learn.training import Example, train_model
+from signface.learn.examples import Example, in_order
+from signface.learn.settings import TrainingSettings
+from signface.learn.training import train_model
 
 
 def held_out_labels(
     corrected: Sequence[Example],
     before: TrainedModel,
+    settings: TrainingSettings = TrainingSettings(),
     *,
     others: Sequence[Example] = (),
-    classifier: str = "forest",
-    seed: int = 0,
-    folds: int = 5,
 ) -> pd.DataFrame:
     """Labels of the corrected takes' stable segments, by the model before and by one trained without the take.
 
@@ -35,12 +35,10 @@ def held_out_labels(
         Takes with the annotators' corrections, at least two.
     before : TrainedModel
         The model in use so far. If it was trained on some of these takes, it knows them; its card says on which.
+    settings : TrainingSettings
+        What is trained, and the number of folds, at most as many as there are takes. Labels need no calibration.
     others : sequence of Example
         Takes that are always trained on and never held out.
-    classifier, seed : optional
-        As in `training.train_model`.
-    folds : int
-        At most as many as there are takes.
 
     Returns
     -------
@@ -54,12 +52,12 @@ def held_out_labels(
     """
     if len(corrected) < 2:
         raise SignfaceError("one take cannot be held out of itself", hint="correct two takes or more")
-    ordered = sorted(corrected, key=lambda example: (example.signer, example.kind, example.take))
-    folds = min(folds, len(ordered))
+    ordered = in_order(corrected)
+    folds = min(settings.folds, len(ordered))
     tables = []
     for fold in range(folds):
         kept = [example for number, example in enumerate(ordered) if number % folds != fold]
-        after = train_model([*kept, *others], classifier=classifier, seed=seed)
+        after = train_model([*kept, *others], settings.changed(calibrate=False))
         for example in ordered[fold::folds]:
             spans = example.stable[["start_s", "end_s"]].to_numpy(float)
             if not len(spans):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from signface.errors import SignfaceError
+from signface.label.choices import AGGREGATES, FEATURES, NORMALISATIONS
 from signface.label.labellers import NAMES, SEQUENCE_NAMES
 from signface.settings import Settings, option
 
@@ -20,7 +21,8 @@ class TrainingSettings(Settings):
     Raises
     ------
     SignfaceError
-        A value is not of its kind, or there is no such classifier.
+        A value is not of its kind, there is no such classifier or feature, or a sequence model is given features:
+        it makes its own of the weights.
 
     See Also
     --------
@@ -44,12 +46,12 @@ class TrainingSettings(Settings):
     normalise: str = option(
         "none",
         help="signer: weights less the signer's mean, over their spread, from all takes of the signer at hand",
-        choices=("none", "signer"),
+        choices=tuple(NORMALISATIONS),
     )
     aggregate: str = option(
         "mean",
         help="label a segment by its mean descriptor (as in the thesis) or by all of its frames",
-        choices=("mean", "frames"),
+        choices=tuple(AGGREGATES),
     )
     balanced: bool = option(False, help="let every label weigh the same in training", kind=bool)
     search: bool = option(False, help="look for the best parameters, by folds of the training takes", kind=bool)
@@ -69,3 +71,24 @@ class TrainingSettings(Settings):
         super().__post_init__()
         if self.folds < 2 or not 0 < self.rate < float("inf"):
             raise SignfaceError(f"folds are two or more, and the rate is positive: {self.folds}, {self.rate:g}")
+        unknown = [name for name in self.features if name not in FEATURES]
+        if unknown or not self.features:
+            problem = f"there are no features named {unknown[0]}" if unknown else "no features are named"
+            raise SignfaceError(problem, hint=f"choose among {', '.join(FEATURES)}")
+        if len(set(self.features)) < len(self.features):
+            raise SignfaceError(f"features are named twice: {', '.join(self.features)}")
+        if self.classifier in SEQUENCE_NAMES and self.features != ("weights",):
+            raise SignfaceError(
+                f"{self.classifier} makes its own features of the weights",
+                hint="leave out the features, or normalise signers",
+            )
+
+    def for_classifier(self, name: str) -> TrainingSettings:
+        """The settings for another classifier; a sequence model makes its own features.
+
+        Examples
+        --------
+        >>> TrainingSettings(features=("windows",)).for_classifier("hmm").features
+        ('weights',)
+        """
+        return self.changed(classifier=name, features=("weights",) if name in SEQUENCE_NAMES else self.features)

@@ -2,14 +2,14 @@
 
 - `GRIDS`: the parameters that a search goes through.
 - `search_parameters`: the best of them.
-- `judge_left_out`: labels and confidences of segments of takes that were left out.
+- `cross_validate`: labels and confidences of segments of takes that were left out.
 
 Neither sees a test take: whoever tests gives them the training takes only, and so nests the one in the other.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,9 +18,10 @@ from sklearn.model_selection import ParameterGrid
 
 from signface.errors import SignfaceError
 from signface.label.labelling import label_spans
-from signface.label.model import TrainedModel
 from signface.learn.examples import Example, signer_levels
+from signface.learn.fitting import fit_model
 from signface.learn.folds import groups_of, inner_folds
+from signface.learn.settings import TrainingSettings
 
 #: classifier: what a search tries, parameter by parameter.
 GRIDS: dict[str, dict[str, list[Any]]] = {
@@ -34,13 +35,11 @@ GRIDS: dict[str, dict[str, list[Any]]] = {
     "sequence": {"boundary_weight": [0.7, 1.0, 1.4], "rarity": [0.4, 0.6, 0.8]},
 }
 
-#: Trains on the takes given, with the parameters given.
-Fit = Callable[[Sequence[Example], Mapping[str, Any]], TrainedModel]
+#: Training takes, and takes left out of them (`signface.learn.folds.inner_folds`).
+Folds = Sequence[tuple[list[Example], list[Example]]]
 
 
-def search_parameters(
-    examples: Sequence[Example], classifier: str, fit: Fit, *, folds: int = 4
-) -> tuple[dict[str, Any], float]:
+def search_parameters(examples: Sequence[Example], settings: TrainingSettings) -> tuple[dict[str, Any], float]:
     """The parameters that do best on training takes left out, and how well they do there.
 
     Classifiers of segments are scored by balanced accuracy on the left-out takes' stable segments, sequence models by
@@ -50,11 +49,8 @@ def search_parameters(
     ----------
     examples : sequence of Example
         The training takes.
-    classifier : str
-    fit : callable
-        See `Fit`.
-    folds : int
-        At most as many as there are groups (`signface.learn.folds`).
+    settings : TrainingSettings
+        Parameters that it sets stay, unless they are searched over.
 
     Returns
     -------
@@ -65,29 +61,33 @@ def search_parameters(
     SignfaceError
         There are too few takes to leave any out.
     """
-    pairs = inner_folds(examples, folds=folds)
+    pairs = inner_folds(examples, folds=settings.folds)
     if not pairs:
         raise SignfaceError(
             "there are too few training takes to search over", hint="train on two takes or more, or without --search"
         )
-    sequential = classifier not in GRIDS
-    grid = list(ParameterGrid(GRIDS["sequence" if sequential else classifier]))
-    scores = _sequence_scores(pairs, grid, fit) if sequential else [_balanced_accuracy(pairs, one, fit) for one in grid]
+    sequential = settings.classifier not in GRIDS
+    grid = list(ParameterGrid(GRIDS["sequence" if sequential else settings.classifier]))
+    if sequential:
+        scores = _sequence_scores(pairs, grid, settings)
+    else:
+        scores = [
+            balanced_accuracy(cross_validate(pairs, settings.changed(parameters={**settings.parameters, **one})))
+            for one in grid
+        ]
     best = int(np.argmax(np.round(scores, 6)))
     return dict(grid[best]), float(scores[best])
 
 
-def judge_left_out(
-    pairs: Sequence[tuple[list[Example], list[Example]]], fit: Fit, parameters: Mapping[str, Any]
-) -> pd.DataFrame:
+def cross_validate(pairs: Folds, settings: TrainingSettings) -> pd.DataFrame:
     """Labels of the stable segments of takes left out, by what was trained on the others.
 
     Parameters
     ----------
     pairs : sequence of pairs of lists of Example
         What `signface.learn.folds.inner_folds` returns.
-    fit, parameters :
-        As in `search_parameters`.
+    settings : TrainingSettings
+        Its parameters are used as they are; nothing is searched or calibrated.
 
     Returns
     -------
@@ -96,14 +96,14 @@ def judge_left_out(
     """
     tables = []
     for kept, left_out in pairs:
-        model = fit(kept, parameters)
-        levels = signer_levels(left_out) if model.card.normalise == "signer" else {}
+        model = fit_model(kept, settings)
+        levels = signer_levels(left_out) if settings.normalise == "signer" else {}
         groups = groups_of(left_out, by_signer=len({e.signer for e in (*kept, *left_out)}) > 1)
         for example, group in zip(left_out, groups, strict=True):
             spans = example.stable[["start_s", "end_s"]].to_numpy(float)
-            found, sure = label_spans(example.descriptors, spans, model, level=levels.get(example.signer))
-            table = pd.DataFrame({"truth": example.stable["label"].to_numpy(object), "found": found})
-            tables.append(table.assign(confidence=sure, signer=example.signer, take=example.take, group=group))
+            labels, confidences = label_spans(example.descriptors, spans, model, level=levels.get(example.signer))
+            table = pd.DataFrame({"truth": example.stable["label"].to_numpy(object), "found": labels})
+            tables.append(table.assign(confidence=confidences, signer=example.signer, take=example.take, group=group))
     return pd.concat(tables, ignore_index=True)
 
 
@@ -112,20 +112,12 @@ def balanced_accuracy(table: pd.DataFrame) -> float:
     return float((table["truth"] == table["found"]).groupby(table["truth"]).mean().mean())
 
 
-def _balanced_accuracy(
-    pairs: Sequence[tuple[list[Example], list[Example]]], parameters: Mapping[str, Any], fit: Fit
-) -> float:
-    return balanced_accuracy(judge_left_out(pairs, fit, parameters))
-
-
-def _sequence_scores(
-    pairs: Sequence[tuple[list[Example], list[Example]]], grid: Sequence[Mapping[str, Any]], fit: Fit
-) -> list[float]:
+def _sequence_scores(pairs: Folds, grid: Sequence[Mapping[str, Any]], settings: TrainingSettings) -> list[float]:
     """Score of each set of parameters: the share of frames rightly labelled, over all left-out takes."""
     totals = np.zeros(len(grid))
     for kept, left_out in pairs:
-        model = fit(kept, {})
-        levels = signer_levels(left_out) if model.card.normalise == "signer" else {}
+        model = fit_model(kept, settings)
+        levels = signer_levels(left_out) if settings.normalise == "signer" else {}
         takes = [model.seen(e.descriptors, levels.get(e.signer)) for e in left_out]
         estimator: Any = model.estimator
         for number, parameters in enumerate(grid):

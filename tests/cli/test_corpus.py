@@ -10,14 +10,15 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from signface.cli.evaluate import measure
 from signface.cli.main import main
 from signface.corpus.examples import solve_examples
 from signface.corpus.manifest import TakeEntry, read_corpus, write_takes
 from signface.descriptors import write_weights
 from signface.elan.writing import write_eaf
+from signface.evaluation.measure import measure
 from signface.label.labellers import NAMES
 from signface.label.persistence import load_model, read_card
+from signface.learn.settings import TrainingSettings
 from signface.segmentation.segments import Segments
 from tests.fixtures.hand_made import corpus
 
@@ -135,8 +136,8 @@ def test_the_report_needs_nothing_outside_itself(folder, tmp_path):
 
 def test_metrics_say_what_was_chosen_in_each_fold_and_how_reliable_it_is(folder):
     examples = solve_examples(read_corpus(folder))
-    training = {"search": True, "calibrate": True, "folds": 2}
-    metrics, _ = measure(examples, ["within"], ["IE", "EU"], ["EU"], 0, classifiers=["knn1"], training=training)
+    settings = TrainingSettings(search=True, folds=2)
+    metrics, _ = measure(examples, settings, protocols=["within"], train_kinds=["IE", "EU"], classifiers=["knn1"])
     tested = [take for fold in metrics["protocol"]["folds"] for take in fold["test_takes"]]
     assert len(tested) == len(set(tested)) == 12
     for fold in metrics["protocol"]["folds"]:

@@ -24,6 +24,7 @@ from signface.label.persistence import save_model
 from signface.learn.training import train_model
 from tests.conftest import REPOSITORY
 from tests.fixtures.hand_made import corpus as hand_made_corpus
+from tests.fixtures.training import quick
 
 TAKES = 24
 
@@ -39,7 +40,7 @@ def ready(tmp_path_factory):
         write_weights(made.descriptors, path)
         entries.append(TakeEntry(path, made.signer, made.kind))
     write_takes(folder / "feel", entries)
-    save_model(train_model(examples, classifier="knn1"), folder / "mine.skops")
+    save_model(train_model(examples, quick("knn1")), folder / "mine.skops")
     assert len(entries) == TAKES
     return folder
 

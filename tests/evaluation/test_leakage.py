@@ -17,6 +17,7 @@ from signface.learn.examples import Example, frame_table
 from signface.learn.folds import groups_of, inner_folds
 from signface.learn.training import train_model
 from tests.fixtures.hand_made import BASES, corpus, example
+from tests.fixtures.training import quick
 
 #: Labels that are drawn at random, in which nothing can be learnt but by leakage.
 DRAWN = ("J", "A", "Su")
@@ -82,7 +83,7 @@ def test_a_fingerprint_gives_a_take_away_to_who_has_seen_a_frame_of_it(prints):
 )
 def test_random_labels_are_found_by_chance_only(prints, protocol, kinds, options):
     folds = protocol_folds(prints, protocol, kinds)
-    found = evaluate(folds, classifiers=["knn1"], training=options).metrics["classifiers"]["knn1"]["manual_segments"]
+    found = evaluate(folds, quick(**options), classifiers=["knn1"]).metrics["classifiers"]["knn1"]["manual_segments"]
     assert found["n"] == 36
     assert found["accuracy"] < BY_CHANCE
 
@@ -96,7 +97,7 @@ def test_random_labels_are_found_by_chance_only_by_sequence_models(prints, proto
 def test_what_is_learnt_of_random_labels_is_not_thought_well_of(prints):
     """Scores that stand in a card come from takes left out."""
     one = [e for e in prints if e.signer == "S0"]
-    scores = train_model(one, classifier="knn1", calibrate=True, folds=3).card.scores
+    scores = train_model(one, quick("knn1", calibrate=True, folds=3)).card.scores
     assert max(scores.values()) < BY_CHANCE
 
 

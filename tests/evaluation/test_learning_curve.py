@@ -12,6 +12,7 @@ from signface.evaluation.learning_curve import learning_curve, remembering
 from signface.evaluation.protocol import folds_of
 from signface.learn.training import train_model
 from tests.fixtures.hand_made import BASES, corpus
+from tests.fixtures.training import quick
 
 
 @pytest.fixture(scope="module")
@@ -26,9 +27,9 @@ def folds(examples, protocol):
 def test_a_curve_grows_by_whole_takes_of_the_training_set_only(examples):
     trained_on = []
 
-    def noting(takes, **options):
+    def noting(takes, settings, **options):
         trained_on.append({e.take for e in takes})
-        return train_model(takes, **options)
+        return train_model(takes, settings, **options)
 
     curve = learning_curve(folds(examples, "within"), classifiers=["knn1"], train=noting)
     assert {take for takes in trained_on for take in takes} == {e.take for e in examples if e.kind == "IE"}
@@ -50,9 +51,9 @@ def test_signers_are_added_with_all_their_takes(examples):
 def test_the_cost_of_a_curve_is_bounded(examples):
     counted = []
 
-    def noting(takes, **options):
+    def noting(takes, settings, **options):
         counted.append(len(takes))
-        return train_model(takes, **options)
+        return train_model(takes, settings, **options)
 
     known = {"knn1": 1.0}
     learning_curve(folds(examples, "within"), classifiers=["knn1"], whole=known, most_takes=60, train=noting)
@@ -64,11 +65,11 @@ def test_a_curve_repeats_with_its_seed(examples):
     for seed in (1, 1, 2):
         parts = set()
 
-        def noting(takes, parts=parts, **options):
+        def noting(takes, settings, parts=parts, **options):
             parts.add(frozenset(e.take for e in takes))
-            return train_model(takes, **options)
+            return train_model(takes, settings, **options)
 
-        curves.append(learning_curve(folds(examples, "within"), classifiers=["knn1"], seed=seed, train=noting))
+        curves.append(learning_curve(folds(examples, "within"), quick(seed=seed), classifiers=["knn1"], train=noting))
         drawn.append(parts)
     assert curves[0].equals(curves[1])
     assert drawn[0] == drawn[1] != drawn[2]
@@ -77,14 +78,14 @@ def test_a_curve_repeats_with_its_seed(examples):
 def test_the_same_takes_are_trained_on_once(examples):
     calls = []
 
-    def noting(takes, **options):
+    def noting(takes, settings, **options):
         calls.append(1)
-        return train_model(takes, **options)
+        return train_model(takes, settings, **options)
 
     train = remembering(noting)
     takes = [e for e in examples if e.kind == "IE"]
-    assert train(takes, classifier="knn1", seed=0) is train(takes[::-1], seed=0, classifier="knn1")
-    train(takes, classifier="knn3", seed=0)
+    assert train(takes, quick("knn1", seed=0)) is train(takes[::-1], quick("knn1", seed=0))
+    train(takes, quick("knn3", seed=0))
     assert len(calls) == 2
 
 
@@ -107,7 +108,7 @@ def test_a_base_that_tells_the_labels_apart_matters_and_noise_does_not(examples)
         return dataclasses.replace(e, descriptors=dataclasses.replace(e.descriptors, weights=weights))
 
     parts = folds([noisy(e) for e in examples], "within")
-    models = [train_model(fold.train, classifier="knn1") for fold in parts]
+    models = [train_model(fold.train, quick("knn1")) for fold in parts]
     table = permutation_importance(parts, models)
     lost = table.set_index("group")["accuracy_lost"]
     assert set(lost.index) == set(BASES)
@@ -118,6 +119,6 @@ def test_a_base_that_tells_the_labels_apart_matters_and_noise_does_not(examples)
 
 def test_only_what_labels_segments_by_their_means_is_asked(examples):
     parts = folds(examples, "within")
-    models = [train_model(fold.train, classifier="knn1", aggregate="frames") for fold in parts]
+    models = [train_model(fold.train, quick("knn1", aggregate="frames")) for fold in parts]
     with pytest.raises(ValueError, match="by their means"):
         permutation_importance(parts, models)

@@ -54,9 +54,9 @@ def test_no_fold_tests_a_take_it_trains_on(rows, protocol):
 def test_training_is_given_the_training_takes_and_nothing_else(examples, monkeypatch):
     trained_on = []
 
-    def noting(takes, **options):
+    def noting(takes, settings, **options):
         trained_on.extend(takes)
-        return train_model(takes, **options)
+        return train_model(takes, settings, **options)
 
     monkeypatch.setattr(protocol_module, "train_model", noting)
     evaluate(folds(examples), classifiers=["knn1"])

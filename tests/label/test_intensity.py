@@ -31,6 +31,7 @@ from signface.learn.ordinal import OrdinalClassifier, ordinal_metrics
 from signface.learn.training import train_model
 from signface.segmentation.segments import Segments
 from tests.fixtures.hand_made import BASES, FACES, moving_face
+from tests.fixtures.training import quick
 
 SHOWN = ("J", "A", "Su")
 
@@ -115,14 +116,14 @@ def test_the_lines_kept_say_what_the_classifiers_behind_them_say(takes):
 def test_without_enough_intensities_there_is_none_to_learn(takes):
     plain = [dataclasses.replace(e, reference=Segments(e.reference.table.drop(columns="intensity"))) for e in takes]
     assert train_intensity(plain) is None
-    assert train_model(plain, classifier="knn1").intensity is None
+    assert train_model(plain, quick("knn1")).intensity is None
     assert train_intensity(takes[:3]) is None
     flat = [dataclasses.replace(e, reference=Segments(e.reference.table.assign(intensity=2))) for e in takes]
     assert train_intensity(flat) is None
 
 
 def test_a_model_keeps_its_intensities_on_disk_and_annotates_them(takes, tmp_path):
-    model = train_model(takes, classifier="knn3")
+    model = train_model(takes, quick("knn3"))
     save_model(model, tmp_path / "m.skops")
     loaded = load_model(tmp_path / "m.skops")
     unseen = graded("new", 98).descriptors

@@ -19,11 +19,12 @@ from signface.learn.training import train_model
 from signface.segmentation.cutting import segment
 from signface.segmentation.segments import Segments
 from tests.fixtures.hand_made import BASES, FACES, corpus, example, moving_face
+from tests.fixtures.training import quick
 
 
 @pytest.fixture(scope="module")
 def model():
-    return train_model([e for e in corpus() if e.kind == "IE"], classifier="knn3", face="default", name="toy")
+    return train_model([e for e in corpus() if e.kind == "IE"], quick("knn3"), face="default", name="toy")
 
 
 def labelled(descriptors, model):

@@ -22,6 +22,7 @@ from signface.label.persistence import CARD, _without_padding, load_model, read_
 from signface.label.vocabulary import AFFECTS
 from signface.learn.training import train_model
 from tests.fixtures.hand_made import corpus, example
+from tests.fixtures.training import quick
 
 
 @pytest.fixture(scope="module")
@@ -32,13 +33,13 @@ def takes():
 @pytest.fixture(scope="module")
 def saved(takes, tmp_path_factory):
     file = tmp_path_factory.mktemp("models") / "toy.skops"
-    save_model(train_model(takes, classifier="knn1", corpus="toy", scores={"of a test": 0.5}), file)
+    save_model(train_model(takes, quick("knn1"), corpus="toy", scores={"of a test": 0.5}), file)
     return file
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_loaded_model_answers_like_the_saved_one(name, takes, tmp_path):
-    model = train_model(takes, classifier=name, corpus="toy", scores={"of a test": 0.5})
+    model = train_model(takes, quick(name), corpus="toy", scores={"of a test": 0.5})
     file = tmp_path / f"{name}.skops"
     save_model(model, file)
     loaded = load_model(file)
@@ -54,9 +55,10 @@ from signface.label.persistence import save_model
 from signface.learn.training import train_model
 from signface.label.vocabulary import AFFECTS
 from tests.fixtures.hand_made import corpus
+from tests.fixtures.training import quick
 takes = [e for e in corpus(("S1",)) if e.kind == "IE"]
 for name in ("knn3", "svm-linear", "svm-rbf", "forest"):
-    save_model(train_model(takes, classifier=name, seed=1), f"{sys.argv[1]}/{name}.skops")
+    save_model(train_model(takes, quick(name, seed=1)), f"{sys.argv[1]}/{name}.skops")
 """
 
 
@@ -137,7 +139,7 @@ def test_a_foreign_file_is_refused(content, tmp_path):
 
 def test_a_skops_file_of_another_tool_is_refused(takes, tmp_path):
     file = tmp_path / "other.skops"
-    skops.io.dump(train_model(takes, classifier="knn1").estimator, file)
+    skops.io.dump(train_model(takes, quick("knn1")).estimator, file)
     with pytest.raises(SignfaceError, match="has no card"):
         load_model(file)
 

@@ -19,6 +19,7 @@ from signface.label.variants import DescriptorVariant
 from signface.learn.training import train_model
 from signface.signer import signer_level
 from tests.fixtures.hand_made import BASES, corpus, example
+from tests.fixtures.training import quick
 
 
 def ramp(slope: float, rate: float, seconds: float = 3.0) -> Descriptors:
@@ -112,7 +113,7 @@ def test_unknown_variants_are_refused(features, normalise, problem):
 def test_a_saved_model_makes_its_variant_of_what_it_annotates(tmp_path, aggregate):
     takes = [e for e in corpus() if e.kind == "IE"]
     options = {"features": ("weights", "windows"), "normalise": "signer", "aggregate": aggregate, "balanced": True}
-    model = train_model(takes, classifier="knn3", **options)
+    model = train_model(takes, quick("knn3", **options))
     save_model(model, tmp_path / "m.skops")
     loaded = load_model(tmp_path / "m.skops")
     assert loaded.card == model.card
@@ -131,15 +132,15 @@ def test_a_saved_model_makes_its_variant_of_what_it_annotates(tmp_path, aggregat
 def test_a_sequence_model_takes_no_other_features():
     takes = [e for e in corpus() if e.kind == "IE"]
     with pytest.raises(SignfaceError, match="its own features"):
-        train_model(takes, classifier="hmm", features=("weights", "windows"))
+        train_model(takes, quick("hmm", features=("weights", "windows")))
 
 
 def test_an_evaluation_normalises_signers_by_their_test_takes():
     examples = corpus()
     folds = folds_of(examples, protocol="across", train_kinds=["IE"], test_kinds=["EU"])
     training = {"normalise": "signer", "aggregate": "frames"}
-    table = evaluate(folds, classifiers=["forest"], training=training).tables["forest"]["manual_segments"]
-    model = train_model(folds[0].train, classifier="forest", **training)
+    table = evaluate(folds, quick(**training), classifiers=["forest"]).tables["forest"]["manual_segments"]
+    model = train_model(folds[0].train, quick("forest", **training))
     level = signer_level([e.descriptors for e in folds[0].test])
     tested = folds[0].test[0]
     spans = tested.stable[["start_s", "end_s"]].to_numpy()
@@ -150,7 +151,7 @@ def test_an_evaluation_normalises_signers_by_their_test_takes():
 
 def test_annotate_normalises_by_all_takes_that_it_is_given(tmp_path):
     takes = [e for e in corpus() if e.kind == "IE"]
-    save_model(train_model(takes, classifier="forest", normalise="signer"), tmp_path / "m.skops")
+    save_model(train_model(takes, quick("forest", normalise="signer")), tmp_path / "m.skops")
     unseen = [
         example(labels, seed=n, take=f"t{n}") for n, labels in enumerate((["N", "J", "N"], ["N", "A", "N", "Su"]))
     ]

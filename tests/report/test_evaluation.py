@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 from lxml import etree
 
-from signface.cli.evaluate import measure
 from signface.descriptors import Descriptors
+from signface.evaluation.measure import measure
 from signface.face.reading import read_face
 from signface.label.vocabulary import AFFECTS
 from signface.report.evaluation.evaluated import Evaluated
@@ -48,7 +48,9 @@ def facts(examples, *, synthetic=True):
 
 
 def evaluated(examples, *, protocols=("within", "across"), classifiers=("knn1", "knn3"), date=None):
-    metrics, found = measure(examples, list(protocols), ["IE"], ["EU"], 0, classifiers=classifiers)
+    metrics, found = measure(
+        examples, protocols=protocols, train_kinds=["IE"], test_kinds=["EU"], classifiers=classifiers
+    )
     return Evaluated(metrics, facts(examples), examples, found, read_face("default"), date)
 
 

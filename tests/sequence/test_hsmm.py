@@ -21,6 +21,7 @@ from signface.metrics.segmentation import boundary_f1
 from signface.sequence.hsmm import make_sequence_labeller
 from signface.sequence.semi_markov import SegmentModel
 from tests.fixtures.hand_made import corpus, example
+from tests.fixtures.training import quick
 
 
 @pytest.fixture(scope="module")
@@ -30,9 +31,9 @@ def takes():
 
 @pytest.fixture(scope="module", params=list(SEQUENCE_NAMES))
 def model(request, takes):
-    quick = {"gru": {"networks": 1, "effort": 90.0}}
+    fewer = {"gru": {"networks": 1, "effort": 90.0}}
     return train_model(
-        [e for e in takes if e.signer == "S1"], classifier=request.param, parameters=quick.get(request.param)
+        [e for e in takes if e.signer == "S1"], quick(request.param, parameters=fewer.get(request.param, {}))
     )
 
 
@@ -110,14 +111,14 @@ def test_sequence_models_are_estimators_that_clone(name):
 
 @pytest.mark.parametrize("name", ["net-hsmm", "crf"])
 def test_neither_a_second_training_nor_the_order_of_takes_changes_anything(name, takes):
-    first, second = (train_model(order, classifier=name, seed=1) for order in (takes[:6], takes[5::-1]))
+    first, second = (train_model(order, quick(name, seed=1)) for order in (takes[:6], takes[5::-1]))
     one = takes[8].descriptors
     assert find_segments(one, first).table.equals(find_segments(one, second).table)
 
 
 def test_a_corpus_of_one_expression_is_refused():
     with pytest.raises(SignfaceError, match="two expressions"):
-        train_model([example(["N"])], classifier="hmm")
+        train_model([example(["N"])], quick("hmm"))
     with pytest.raises(SignfaceError, match="no sequence model"):
         make_sequence_labeller("hsmm")
 
