@@ -12,9 +12,10 @@ from sklearn.model_selection import GridSearchCV
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
-from signface.label.labellers import NAMES, make_labeller
+from signface.label.labellers import NAMES, SEQUENCE_NAMES, make_labeller
 from signface.label.labelling import label_spans
 from signface.learn.examples import Example, training_frames
+from signface.learn.settings import TrainingSettings
 from signface.learn.training import train_model
 from signface.segmentation.segments import Segments
 from tests.fixtures.hand_made import BASES, corpus, example
@@ -155,3 +156,36 @@ def test_left_out_takes_are_scored_and_noise_scores_near_chance(takes):
     ]
     score, _ = train_model(noisy, quick("knn3", calibrate=True)).card.scores.values()
     assert score < 0.75  # neutral is 60 % of the segments
+
+
+def test_the_card_says_the_settings_as_they_were_chosen(takes):
+    settings = quick("knn3", normalise="signer", seed=3)
+    card = train_model(takes, settings).card
+    assert TrainingSettings.from_dict(card.training) == settings
+    assert (card.classifier, card.normalise, card.seed) == ("knn3", "signer", 3)
+
+
+def test_settings_for_another_classifier_change_nothing_but_what_it_cannot_use():
+    settings = TrainingSettings(features=("windows", "weights"))
+    for name in (*NAMES, *SEQUENCE_NAMES):
+        one = settings.for_classifier(name)
+        assert one.classifier == name
+        assert one.features == (("weights",) if name in SEQUENCE_NAMES else ("windows", "weights"))
+        assert one.changed(classifier="forest", features=settings.features) == settings
+
+
+@pytest.mark.parametrize(
+    ("values", "problem"),
+    [
+        ({"features": ("smell",)}, "no features named smell"),
+        ({"features": ()}, "no features are named"),
+        ({"features": ("weights", "weights")}, "named twice"),
+        ({"classifier": "hmm", "features": ("windows",)}, "makes its own features"),
+        ({"classifier": "oracle"}, "oracle"),
+        ({"folds": 1}, "two or more"),
+        ({"aggregate": "median"}, "median"),
+    ],
+)
+def test_settings_that_cannot_be_are_refused_when_they_are_made(values, problem):
+    with pytest.raises(SignfaceError, match=problem):
+        TrainingSettings(**values)
