@@ -30,7 +30,7 @@ from signface.takes.take import Take
 IN_PIECES = """
 import sys
 from signface.annotation import describe_pieces
-from signface.descriptors import WeightsWriter
+from signface.descriptors_files import WeightsWriter
 from signface.takes.reading import open_recording
 recording, length = open_recording(sys.argv[1]), int(sys.argv[3])
 with WeightsWriter(sys.argv[2]) as writer:

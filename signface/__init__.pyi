@@ -2,7 +2,8 @@ from . import datasets
 from .annotation import Annotation, annotate
 from .corpus.manifest import Corpus, read_corpus
 from .corpus.running import run_corpus
-from .descriptors import Descriptors, read_weights, write_weights
+from .descriptors import Descriptors
+from .descriptors_files import read_weights, write_weights
 from .elan.options import EafOptions
 from .elan.reference import read_reference, read_tiers
 from .elan.writing import write_eaf

@@ -102,7 +102,7 @@ def mini_weights(name: str = "M2_EU_04") -> Descriptors:
     >>> weights.n_frames, len(weights.names)
     (1184, 51)
     """
-    from signface.descriptors import read_weights
+    from signface.descriptors_files import read_weights
 
     return read_weights(_file(name, f"truth/{name}.parquet"))
 

@@ -1,31 +1,32 @@
 """`Descriptors`: blendshape weights in time, the object that everything after the solve works on.
 
 It stands at the top of the package because the rooms on both sides of it (solve, and segment to render) share it.
+`signface.descriptors_files` writes it to disk and reads it back.
 """
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from os import PathLike
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from signface.columns import RESIDUAL, TIME, base_column, pose_columns
+from signface.content import Content
 from signface.errors import SignfaceError
-from signface.files import whole_file
+from signface.extras import needed
+from signface.frames import TimedArrays
 
 if TYPE_CHECKING:
     import pandas as pd
-    import pyarrow as pa
+    import xarray
 
     from signface.solve_settings import SolveSettings
 
 
-@dataclass(frozen=True)
-class Descriptors:
+@dataclass(frozen=True, eq=False)
+class Descriptors(TimedArrays, Content):
     """Blendshape weights of a take.
 
     Parameters
@@ -43,7 +44,8 @@ class Descriptors:
         (weights that came straight from a phone).
     head : (F, 4, 4) float64 array, optional
         Pose of the head relative to its neutral frame: maps a point of the neutral head to its place in the
-        recording, millimetres. The identity when unknown.
+        recording, millimetres. The identity throughout when unknown; NaN in single frames
+        in which it is.
     name : str
         Name of the take.
     history : tuple of str
@@ -61,9 +63,9 @@ class Descriptors:
     residual: np.ndarray | None = None
     head: np.ndarray | None = None
     name: str = "take"
-    history: tuple[str, ...] = field(default=())
+    history: tuple[str, ...] = field(default=(), compare=False)
     deviation: np.ndarray | None = None
-    settings: SolveSettings | None = None
+    settings: SolveSettings | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         weights = np.array(self.weights, dtype=np.float64)
@@ -102,16 +104,6 @@ class Descriptors:
         """Number of frames F."""
         return self.weights.shape[0]
 
-    @property
-    def duration(self) -> float:
-        """Duration in seconds: frames over rate."""
-        return self.n_frames / self.rate
-
-    @property
-    def time(self) -> np.ndarray:
-        """(F,) time of each frame in seconds."""
-        return self.start + np.arange(self.n_frames) / self.rate
-
     def weight(self, name: str) -> np.ndarray:
         """(F,) weights of one base, by name.
 
@@ -144,171 +136,66 @@ class Descriptors:
         """A copy with some fields replaced and `operation` appended to its history."""
         return replace(self, history=(*self.history, operation), **fields)  # type: ignore[arg-type]
 
-    def table(self) -> pd.DataFrame:
-        """The columns of the weights file: `time_s`, one per base, `residual_mm`."""
-        import pandas as pd
-
-        table = pd.DataFrame(self.weights, columns=list(self.names))
-        table.insert(0, "time_s", self.time)
-        table["residual_mm"] = self.residual
-        return table
-
-
-class WeightsWriter:
-    """A weights file written piece by piece: `time_s`, one column per base and `residual_mm`.
-
-    As a context manager it appends to a temporary file, which takes the place of `path` when the block ends well and
-    vanishes when it does not. The bytes depend on the frames, not on how they come in pieces, but for the groups of
-    rows of a .parquet.
-
-    Parameters
-    ----------
-    path : path
-        .csv or .parquet.
-
-    Raises
-    ------
-    SignfaceError
-        The ending is neither, or the folder cannot be written.
-
-    Examples
-    --------
-    >>> with WeightsWriter("weights.csv") as writer:  # doctest: +SKIP
-    ...     for piece in solve_pieces(recording, face, layout):
-    ...         writer.append(piece)
-    """
-
-    def __init__(self, path: str | PathLike[str]) -> None:
-        if Path(path).suffix.lower() not in (".csv", ".parquet"):
-            raise SignfaceError("the ending of a weights file is .csv or .parquet", file=path)
-        self.path, self.frames, self._begun = Path(path), 0, False
-        self._names: tuple[str, ...] = ()
-        self._start = self._rate = 0.0
-        self._open = contextlib.ExitStack()
-
-    def __enter__(self) -> WeightsWriter:
-        self._temporary = self._open.enter_context(whole_file(self.path))
-        return self
-
-    def __exit__(self, kind: Any, error: Any, trace: Any) -> bool | None:
-        if kind is None and not self._begun:
-            nothing = SignfaceError("there are no weights to write", file=self.path)
-            self._open.__exit__(SignfaceError, nothing, None)
-            raise nothing
-        return self._open.__exit__(kind, error, trace)
-
-    def append(self, piece: Descriptors) -> None:
-        """Write the frames that follow those before.
+    def columns(self) -> dict[str, np.ndarray]:
+        """(F,) numbers under the names of a weights file: `time_s`, one per base, `head_*`, `residual_mm`.
 
         Raises
         ------
         SignfaceError
-            The piece has other bases than those before.
+            The head's poses are no rigid motions.
         """
-        import pyarrow as pa
+        assert self.head is not None
+        assert self.residual is not None
+        weights = {base_column(name): values for name, values in zip(self.names, self.weights.T, strict=True)}
+        return {TIME: self.time, **weights, **pose_columns(self.head), RESIDUAL: self.residual}
 
-        if not self._begun:
-            self._names, self._start, self._rate = piece.names, piece.start, piece.rate
-            self._begin()
-        elif piece.names != self._names:
-            raise SignfaceError("the pieces of a take have different bases", file=self.path)
-        time = self._start + np.arange(self.frames, self.frames + piece.n_frames) / self._rate
-        columns = [time, *piece.weights.T, piece.residual]
-        if self.path.suffix.lower() == ".csv":
-            # A rate is recovered from the times: a microsecond's rounding would show in a take of few frames.
-            columns = [time.round(9), *(column.round(6) for column in columns[1:])]
-        arrays = [_arrow(np.ascontiguousarray(column)) for column in columns]
-        self._writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
-        self.frames += piece.n_frames
+    def to_frame(self) -> pd.DataFrame:
+        """A table with a row for each frame, `time_s` its index; written as csv it is a weights file.
 
-    def _begin(self) -> None:
-        import pyarrow as pa
+        Its columns are the bases, the head's pose (`head_x_mm, head_y_mm, head_z_mm`: where the origin of the neutral
+        head is; `head_rx_deg, head_ry_deg, head_rz_deg`: its rotation vector) and `residual_mm`.
 
-        self._begun = True
-        names = ["time_s", *self._names, "residual_mm"]
-        self._schema = pa.schema([(name, pa.float64()) for name in names])
-        if self.path.suffix.lower() == ".csv":
-            from pyarrow import csv
+        See Also
+        --------
+        to_xarray : with labelled axes, deviations and history.
+        signface.descriptors_files.write_weights : the same on disk.
 
-            file = self._open.enter_context(self._temporary.open("wb"))
-            file.write((",".join(names) + "\n").encode())  # Arrow would put the names in quotes
-            options = csv.WriteOptions(include_header=False)
-            self._writer: Any = self._open.enter_context(csv.CSVWriter(file, self._schema, write_options=options))
-        else:
-            from pyarrow import parquet
+        Examples
+        --------
+        >>> take = Descriptors(np.array([[0.0], [0.5]]), ("jawOpen",), rate=100)
+        >>> take.to_frame()["jawOpen"]
+        time_s
+        0.00    0.0
+        0.01    0.5
+        Name: jawOpen, dtype: float64
+        """
+        import pandas as pd
 
-            self._writer = self._open.enter_context(parquet.ParquetWriter(self._temporary, self._schema))
+        return pd.DataFrame(self.columns()).set_index(TIME)
 
+    def to_xarray(self) -> xarray.Dataset:
+        """The take with labelled axes: `weights` and, where it is known, `deviation` over `time` and `base`, `residual`
+        over `time`, and `head`, the pose's 4 by 4 matrix over `time`, `row` and `column`.
 
-def _arrow(column: np.ndarray) -> pa.Array:
-    """A column for Arrow, empty where it is NaN (`pa.array` would import pandas, a third of a second)."""
-    import pyarrow as pa
+        The attributes are `name`, `rate` (Hz), `history` (a line for each step) and, where the weights were solved,
+        `settings` in words.
 
-    known = np.packbits(~np.isnan(column), bitorder="little")
-    return pa.Array.from_buffers(pa.float64(), len(column), [pa.py_buffer(known), pa.py_buffer(column)])
-
-
-def write_weights(descriptors: Descriptors, path: str | PathLike[str]) -> None:
-    """Write `time_s`, one column per base and `residual_mm` as .csv or .parquet, by the ending of `path`.
-
-    Raises
-    ------
-    SignfaceError
-        The ending is neither, or the folder cannot be written.
-    """
-    with WeightsWriter(path) as writer:
-        writer.append(descriptors)
-
-
-def is_weights_table(columns: list[str]) -> bool:
-    """Whether the columns of a table are those of a weights file (`time_s`, bases, `residual_mm`)."""
-    return len(columns) > 2 and columns[0] == "time_s" and columns[-1] == "residual_mm"
-
-
-def read_weights(path: str | PathLike[str]) -> Descriptors:
-    """Read a weights file written by `write_weights`.
-
-    The rate is recovered from the `time_s` column (median step).
-
-    Raises
-    ------
-    SignfaceError
-        The file is missing or is no weights file, has fewer than two rows, or its times do not rise evenly.
-    """
-    import pandas as pd
-
-    file = Path(path)
-    if not file.is_file():
-        raise SignfaceError("no such file", file=file)
-    try:
-        with file.open("rb") as stream:
-            parquet = stream.read(4) == b"PAR1"
-        table = pd.read_parquet(file) if parquet else pd.read_csv(file)
-    except Exception as error:  # a damaged Parquet file brings errors of every kind out of pyarrow
-        raise SignfaceError("cannot be read as a table of weights", file=file) from error
-    if not is_weights_table([str(column) for column in table.columns]):
-        raise SignfaceError(
-            "is not a weights file", file=file, hint="its columns are time_s, one per base, residual_mm"
-        )
-    try:
-        values = table.to_numpy(dtype=np.float64)
-    except ValueError as error:
-        raise SignfaceError("has cells that are not numbers", file=file) from error
-    time = values[:, 0]
-    if len(time) < 2:
-        raise SignfaceError("has fewer than two frames", file=file, hint="a rate needs two frames")
-    steps = np.diff(time)
-    step = float(np.median(steps))
-    if not np.isfinite(time).all() or step <= 0 or np.abs(steps - step).max() > 0.25 * step:
-        raise SignfaceError("the times in time_s do not rise evenly", file=file, hint="solve the take again")
-    rate = (len(time) - 1) / (time[-1] - time[0])
-    rate = round(rate, 3)  # 200 must not come back as 199.9999999
-    return Descriptors(
-        weights=values[:, 1:-1],
-        names=tuple(str(column) for column in table.columns[1:-1]),
-        rate=rate,
-        start=float(time[0]),
-        residual=values[:, -1],
-        name=file.stem,
-        history=(f"read_weights {file.name}",),
-    )
+        Raises
+        ------
+        SignfaceError
+            xarray is not installed.
+        """
+        xarray = needed("xarray", "xarray")
+        axes = ("time", "base")
+        variables = {
+            "weights": (axes, self.weights, {"long_name": "0 at rest, 1 fully active"}),
+            "residual": ("time", self.residual, {"units": "mm"}),
+            "head": (("time", "row", "column"), self.head, {"long_name": "pose of the head", "units": "mm"}),
+        }
+        if self.deviation is not None:
+            variables["deviation"] = (axes, self.deviation, {"long_name": "standard deviation of the weights"})
+        attributes = {"name": self.name, "rate": self.rate, "history": "\n".join(self.history)}
+        if self.settings is not None:
+            attributes["settings"] = str(self.settings)
+        coordinates = {"time": ("time", self.time, {"units": "s"}), "base": list(self.names)}
+        return xarray.Dataset(variables, coordinates, attributes)

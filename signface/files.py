@@ -22,18 +22,26 @@ DATA = _PACKAGE if (_PACKAGE / "models").is_dir() else _PACKAGE.parent
 
 
 @contextlib.contextmanager
-def whole_file(path: str | PathLike[str]) -> Iterator[Path]:
+def whole_file(
+    path: str | PathLike[str], *, fsync: bool = False, mark: str = "", suffix: str | None = None
+) -> Iterator[Path]:
     """Give a temporary path beside `path`; it replaces `path` if the block ends well, and vanishes if not.
 
     Parameters
     ----------
     path : path
         The file to write. Its folder is created when missing.
+    fsync : bool
+        Whether what was written must be on the disk before it takes its name: a computer may lose its power.
+    mark : str
+        Stands in the temporary name, so that whose it is can be told.
+    suffix : str, optional
+        Ending of the temporary name; that of `path` by default, so that writers which look at the ending agree.
 
     Yields
     ------
     Path
-        Where to write. It has the same suffix as `path`, so that writers which look at the ending agree.
+        Where to write.
 
     Raises
     ------
@@ -43,7 +51,8 @@ def whole_file(path: str | PathLike[str]) -> Iterator[Path]:
     target = Path(path)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
+        ending = target.suffix if suffix is None else suffix
+        handle, name = tempfile.mkstemp(prefix=f".{target.stem}-{mark}", suffix=ending, dir=target.parent)
         os.close(handle)
     except OSError as error:
         raise SignfaceError(
@@ -52,6 +61,9 @@ def whole_file(path: str | PathLike[str]) -> Iterator[Path]:
     temporary = Path(name)
     try:
         yield temporary
+        if fsync:
+            with temporary.open("rb") as written:
+                os.fsync(written.fileno())
         umask = os.umask(0)
         os.umask(umask)
         temporary.chmod(0o666 & ~umask)  # mkstemp makes it private; a result is shared as any other file

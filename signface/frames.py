@@ -1,5 +1,6 @@
-"""What is counted in frames: runs of them, states from curves, means over stretches of time.
+"""What is counted in frames: their times, runs of them, states from curves, means over stretches of time.
 
+- `Timed`: what has frames at times; `TimedArrays` can be cut in time.
 - `runs`: where something holds without a break.
 - `hysteresis`, `bridge`, `long_enough`: from a curve to the stretches in which something is on.
 - `Means`: means of a signal over any stretches of time.
@@ -7,7 +8,115 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any, Self
+
 import numpy as np
+
+from signface.errors import SignfaceError
+
+#: Where a cut falls, in frames: times that were rounded for a table must not decide.
+CUT_SLACK = 1e-3
+
+
+class Timed:
+    """What has frames at times: `n_frames` of them, `rate` a second (Hz), the first at `start` seconds."""
+
+    if TYPE_CHECKING:  # fields or properties of those who take this in
+
+        @property
+        def rate(self) -> float: ...
+
+        @property
+        def start(self) -> float: ...
+
+        @property
+        def name(self) -> str: ...
+
+        @property
+        def n_frames(self) -> int: ...
+
+    @property
+    def duration(self) -> float:
+        """Duration in seconds: frames over rate."""
+        return self.n_frames / self.rate
+
+    @property
+    def time(self) -> np.ndarray:
+        """(F,) time of each frame in seconds."""
+        return self.start + np.arange(self.n_frames) / self.rate
+
+    def frame_at(self, seconds: float) -> int:
+        """Index of the frame nearest to a time in seconds.
+
+        Raises
+        ------
+        SignfaceError
+            The time lies outside the take.
+        """
+        frame = round((seconds - self.start) * self.rate) if np.isfinite(seconds) else -1
+        if not 0 <= frame < self.n_frames:
+            last = self.start + (self.n_frames - 1) / self.rate
+            raise SignfaceError(
+                f"{self.name}: the time {seconds:g} s is outside the take",
+                hint=f"give a time from {self.start:.3f} to {last:.3f} s",
+            )
+        return frame
+
+
+class TimedArrays(Timed):
+    """A timed dataclass with a history, every array of which has a row for each frame."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def history(self) -> tuple[str, ...]: ...
+
+    def between(self, start_s: float, end_s: float) -> Self:
+        """The frames whose time t is `start_s <= t < end_s`, at their times: `start` becomes that of the first.
+
+        Times count to a thousandth of a frame, so that rounded ones cut where they seem to, and neighbouring
+        stretches share no frame and lose none.
+
+        Parameters
+        ----------
+        start_s, end_s : float
+            Seconds on the time line of the take; `-math.inf` and `math.inf` leave an end as it is.
+
+        Raises
+        ------
+        SignfaceError
+            No frame lies there.
+
+        Examples
+        --------
+        >>> from signface.descriptors import Descriptors
+        >>> take = Descriptors(np.zeros((500, 1)), ("jawOpen",), rate=100)
+        >>> part = take.between(2.0, 4.5)
+        >>> part.n_frames, part.start, part.history
+        (250, 2.0, ('between 2 and 4.5 s',))
+        """
+        begin, end = (self._frame_from(seconds) for seconds in (start_s, end_s))
+        if not begin < end:
+            last = self.start + (self.n_frames - 1) / self.rate
+            raise SignfaceError(
+                f"{self.name}: no frame lies between {start_s:g} and {end_s:g} s",
+                hint=f"the take goes from {self.start:.3f} to {last:.3f} s",
+            )
+        note = f"between {start_s:g} and {end_s:g} s"
+        return replace(  # type: ignore[type-var]
+            self, start=self.start + begin / self.rate, history=(*self.history, note), **self._rows(begin, end)
+        )
+
+    def _frame_from(self, seconds: float) -> int:
+        """The first frame that is not before a time; nan is after all."""
+        place = (seconds - self.start) * self.rate - CUT_SLACK
+        return int(np.ceil(np.nan_to_num(min(max(place, 0.0), self.n_frames), nan=self.n_frames)))
+
+    def _rows(self, begin: int, end: int) -> dict[str, Any]:
+        """The fields that change when only these frames stay."""
+        values = {item.name: getattr(self, item.name) for item in fields(self)}  # type: ignore[arg-type]
+        return {name: value[begin:end] for name, value in values.items() if isinstance(value, np.ndarray)}
 
 
 def runs(mask: np.ndarray) -> np.ndarray:

@@ -10,13 +10,14 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from signface.content import Content
 from signface.errors import SignfaceError
 from signface.files import whole_file
 
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class SignerBases:
+class SignerBases(Content):
     """Bases as one signer shows them: displacements of markers, in the face's unit.
 
     Parameters
@@ -42,7 +43,7 @@ class SignerBases:
     bases: tuple[str, ...]
     markers: tuple[str, ...]
     displacements: np.ndarray
-    source: str = ""
+    source: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
         places = np.array(self.displacements, dtype=np.float64)
@@ -102,7 +103,7 @@ class SignerBases:
 
 
 @dataclass(frozen=True, eq=False)
-class SignerLevel:
+class SignerLevel(Content):
     """How a signer's weights lie, whatever is expressed.
 
     Parameters
@@ -146,7 +147,7 @@ def signer_level(takes: Sequence[Descriptors]) -> SignerLevel:
     return SignerLevel(names, mean, np.sqrt((squares / seconds - mean**2).clip(0)))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Signer:
     """A signer: what tiers are called, bases of their own, and where their face rests.
 

@@ -45,3 +45,22 @@ def face():
     from signface.face.reading import read_face
 
     return read_face("default")
+
+
+@pytest.fixture(scope="session")
+def nodding():
+    """Two seconds of weights in which the head nods and rises: 50 Hz, some frames unknown."""
+    import numpy as np
+    from scipy.spatial.transform import Rotation
+
+    from signface.descriptors import Descriptors
+
+    time = np.arange(100) / 50
+    head = np.tile(np.eye(4), (100, 1, 1))
+    head[:, :3, :3] = Rotation.from_euler("x", 20 * np.sin(time)[:, None], degrees=True).as_matrix()
+    head[:, 1, 3] = 5 * time
+    weights = np.stack([time / 2, np.cos(time)], axis=1)
+    residual = 0.1 + time / 10
+    for array in (weights, residual, head):
+        array[7:9] = np.nan
+    return Descriptors(weights, ("jawOpen", "browInnerUp"), 50.0, 0.0, residual, head, "nodding", ("made",))

@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from signface.annotation import describe_pieces, median_known
-    from signface.descriptors import WeightsWriter
+    from signface.descriptors_files import WeightsWriter
     from signface.takes.reading import open_recording
 
     ending = arguments.output.suffix.lower()

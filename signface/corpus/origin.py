@@ -27,7 +27,7 @@ from signface.files import shipped
 #: The modules between a recording and its descriptors.
 SOLVING_CODE = (
     *("takes", "face", "solver", "corpus/describing.py", "annotation.py"),
-    *("descriptors.py", "frames.py", "settings.py", "solve_settings.py"),
+    *("descriptors.py", "descriptors_files.py", "columns.py", "frames.py", "settings.py", "solve_settings.py"),
 )
 
 

@@ -1,7 +1,7 @@
 """The descriptors of a corpus on disk: solved once, kept beside the recordings, open to any tool.
 
 - `DescriptorStore`: read and write the descriptors of takes by their origin.
-- `read_stored`: one file of a store.
+- `read_provenance`: where one file of a store comes from.
 - `open_store`: the store of a corpus, or None where there can be none.
 
 A store is the folder `descriptors` of a corpus. Each recipe (face, layout, parameters, solver) has a folder in it, and
@@ -10,44 +10,31 @@ each take one Parquet file there, so that a folder of a recipe is one table:
     pandas.read_parquet("feel/descriptors/default-5f0c1e2ab4")
     duckdb.sql("FROM 'feel/descriptors/default-5f0c1e2ab4/**/*.parquet' SELECT signer, avg(jawOpen) GROUP BY ALL")
 
-The columns are `take, signer, kind, time_s`, one per base, `residual_mm`, and `head_00` to `head_33`, the pose of the
-head row by row (millimetres). A base whose name is taken is called `base:NAME`. The file's metadata holds, under
-`signface`, what cannot stand in a row and where it all comes from. Values are kept to the last bit.
+The files are those of `signface.descriptors_files`, opened by the columns `take, signer, kind`. Their metadata says,
+too, where it all comes from.
 """
 
 from __future__ import annotations
 
-import io
-import json
 import os
 import socket
-import tempfile
 from collections.abc import Iterator
 from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from signface.corpus.origin import Origin
 from signface.descriptors import Descriptors
+from signface.descriptors_files import NewerFile, WeightsWriter, read_about, read_parquet
 from signface.errors import SignfaceError
+from signface.extras import needed
 from signface.files import bundled_corpus
 
 if TYPE_CHECKING:
     import pandas as pd
-    import pyarrow as pa
 
 FOLDER = "descriptors"
-
-#: Raised whenever an older signface would misread what a newer one wrote.
-FORMAT = 1
-METADATA = b"signface"
-
-HEAD = tuple(f"head_{row}{column}" for row in range(4) for column in range(4))
-WORDS = ("take", "signer", "kind")
-TAKEN = (*WORDS, "time_s", "residual_mm", *HEAD)
 
 
 class DescriptorStore:
@@ -83,7 +70,7 @@ class DescriptorStore:
         for recipe in self.recipes():
             first = next(stored_files(recipe), None)
             if first is not None:
-                _metadata(first, _content(first))
+                read_provenance(first)
 
     def recipes(self) -> list[Path]:
         """Folders of the recipes there are, sorted."""
@@ -108,11 +95,9 @@ class DescriptorStore:
         if not file.is_file():
             return None
         try:
-            content = _content(file)
-            if _metadata(file, content)["key"] != origin.key:
-                return None
-            return _from_parquet(file, content)
-        except NewerStore:
+            with _opened(file) as stream:
+                return read_parquet(stream, file) if _provenance(stream, file)["key"] == origin.key else None
+        except NewerFile:
             raise
         except SignfaceError:
             return None
@@ -126,20 +111,17 @@ class DescriptorStore:
             The folder cannot be written.
         """
         file = self.path(origin)
-        content = _as_parquet(origin, descriptors)
+        words = {"take": origin.take, "signer": origin.signer, "kind": origin.kind}
+        about = {
+            "key": origin.key,
+            "origin": origin.as_dict(),
+            "versions": {package: version(package) for package in ("signface", "numpy", "scipy")},
+        }
+        # Not named .parquet until it is whole: a query over the folder may run at any moment.
+        writer = WeightsWriter(file, words=words, about=about, fsync=True, mark=f"{_owner()}-", suffix=".part")
         try:
-            file.parent.mkdir(parents=True, exist_ok=True)
-            # Not named .parquet until it is whole: a query over the folder may run at any moment.
-            handle, name = tempfile.mkstemp(prefix=f".{file.stem}-{_owner()}-", suffix=".part", dir=file.parent)
-            try:
-                with os.fdopen(handle, "wb") as stream:
-                    stream.write(content)
-                    stream.flush()
-                    os.fsync(stream.fileno())
-                os.chmod(name, 0o644)
-                os.replace(name, file)
-            finally:
-                Path(name).unlink(missing_ok=True)
+            with writer:
+                writer.append(descriptors)
         except OSError as error:
             raise SignfaceError(
                 f"cannot be written ({error.strerror})", file=file, hint="free the disk, or make the corpus writable"
@@ -182,10 +164,7 @@ class DescriptorStore:
         2  M2_EU_04    1184
         3   M2_SE_A    1758
         """
-        try:
-            import duckdb
-        except ModuleNotFoundError as error:
-            raise SignfaceError("the package duckdb is not installed", hint="pip install 'signface[corpus]'") from error
+        duckdb = needed("duckdb", "corpus")
         there = [path.name for path in self.recipes()]
         if recipe is None and len(there) == 1:
             recipe = there[0]
@@ -201,10 +180,6 @@ class DescriptorStore:
                 return connection.sql(sql).df()
             except duckdb.Error as error:
                 raise SignfaceError(f"the query failed: {str(error).splitlines()[0]}", file=self.folder) from error
-
-
-class NewerStore(SignfaceError):
-    """A file was written by a newer signface than this one."""
 
 
 def open_store(corpus: str | PathLike[str]) -> DescriptorStore | None:
@@ -226,126 +201,33 @@ def stored_files(folder: Path) -> Iterator[Path]:
     yield from sorted(path for path in folder.rglob("*.parquet") if not path.name.startswith("."))
 
 
-def read_stored(path: str | PathLike[str]) -> Descriptors:
-    """Read one file of a store.
-
-    Raises
-    ------
-    SignfaceError
-        The file is missing, damaged, no file of a store, or was written by a newer signface.
-    """
-    file = Path(path)
-    return _from_parquet(file, _content(file))
-
-
 def read_provenance(path: str | PathLike[str]) -> dict[str, Any]:
     """Where a file of a store comes from: `key`, `origin` (with the recipe), `versions`, `history`, ...
 
     Raises
     ------
     SignfaceError
-        As `read_stored`.
+        The file is missing, damaged, no file of a store, or was written by a newer signface.
     """
-    return _metadata(Path(path), _content(Path(path)))
+    with _opened(Path(path)) as stream:
+        return _provenance(stream, Path(path))
 
 
-def column(base: str) -> str:
-    """Name of the column of a base."""
-    return f"base:{base}" if base in TAKEN else base
-
-
-def _as_parquet(origin: Origin, descriptors: Descriptors) -> bytes:
-    """The file of a take; the same descriptors give the same bytes."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    frames = descriptors.n_frames
-    assert descriptors.residual is not None
-    assert descriptors.head is not None
-    columns: dict[str, Any] = {
-        word: pa.DictionaryArray.from_arrays(pa.array(np.zeros(frames, np.int32)), pa.array([text]))
-        for word, text in zip(WORDS, (origin.take, origin.signer, origin.kind), strict=True)
-    }
-    columns["time_s"] = descriptors.time
-    columns |= {column(name): descriptors.weights[:, n] for n, name in enumerate(descriptors.names)}
-    columns["residual_mm"] = descriptors.residual
-    columns |= {name: descriptors.head.reshape(frames, 16)[:, n] for n, name in enumerate(HEAD)}
-    about = {
-        "format": FORMAT,
-        "key": origin.key,
-        "bases": list(descriptors.names),
-        "rate": descriptors.rate.hex(),
-        "start": descriptors.start.hex(),
-        "name": descriptors.name,
-        "history": list(descriptors.history),
-        "origin": origin.as_dict(),
-        "versions": {package: version(package) for package in ("signface", "numpy", "scipy")},
-    }
-    table = pa.table(columns).replace_schema_metadata({METADATA: json.dumps(about, ensure_ascii=False).encode()})
-    buffer = io.BytesIO()
-    # Doubles without a dictionary: it would make all NaN one.
-    pq.write_table(
-        table,
-        buffer,
-        compression="zstd",
-        use_dictionary=list(WORDS),
-        column_encoding={name: "BYTE_STREAM_SPLIT" for name in table.column_names if name not in WORDS},
-        write_page_checksum=True,
-    )
-    return buffer.getvalue()
-
-
-def _content(file: Path) -> pa.BufferReader:
-    """The bytes of a file, read once: another writer may replace it at any moment."""
-    import pyarrow as pa
-
+def _opened(file: Path) -> BinaryIO:
+    """The file, opened once: another writer may replace it at any moment."""
     try:
-        return pa.BufferReader(file.read_bytes())
+        return file.open("rb")
     except FileNotFoundError as error:
         raise SignfaceError("no such file", file=file) from error
     except OSError as error:
         raise SignfaceError(f"cannot be read ({error.strerror})", file=file) from error
 
 
-def _metadata(file: Path, content: pa.BufferReader) -> dict[str, Any]:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        about = json.loads((pq.read_metadata(content).metadata or {})[METADATA])
-        written = int(about["format"])
-    except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
-        raise SignfaceError("is no descriptors of a store, or is cut off", file=file, hint="delete it") from error
-    if written > FORMAT:
-        raise NewerStore(
-            f"was written by a newer signface (format {written}, this one reads up to {FORMAT})",
-            file=file,
-            hint="update signface; nothing was changed",
-        )
+def _provenance(stream: BinaryIO, file: Path) -> dict[str, Any]:
+    about = read_about(stream, file)
+    if about is None or "key" not in about:
+        raise SignfaceError("is no descriptors of a store", file=file, hint="delete it")
     return about
-
-
-def _from_parquet(file: Path, content: pa.BufferReader) -> Descriptors:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    about = _metadata(file, content)
-    try:
-        with pq.ParquetFile(content, page_checksum_verification=True) as parquet:
-            table = parquet.read()
-        weights = [table[column(name)].to_numpy() for name in about["bases"]]
-        return Descriptors(
-            weights=np.stack(weights, axis=1) if weights else np.zeros((table.num_rows, 0)),
-            names=tuple(about["bases"]),
-            rate=float.fromhex(about["rate"]),
-            start=float.fromhex(about["start"]),
-            residual=table["residual_mm"].to_numpy(),
-            head=np.stack([table[name].to_numpy() for name in HEAD], axis=1).reshape(-1, 4, 4),
-            name=about["name"],
-            history=tuple(about["history"]),
-        )
-    except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
-        raise SignfaceError("is damaged", file=file, hint="delete it: the take is then solved again") from error
 
 
 def _owner() -> str:

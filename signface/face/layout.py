@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from signface.content import Content
 from signface.errors import SignfaceError
 from signface.face.model import FaceModel
 
 ROLES = ("face", "head")
 
 
-@dataclass(frozen=True)
-class MarkerLayout:
+@dataclass(frozen=True, eq=False)
+class MarkerLayout(Content):
     """Marker labels, their roles, and their points on a face's neutral surface.
 
     Parameters

@@ -69,7 +69,7 @@ def read_layout(name_or_path: str | PathLike[str], face: FaceModel) -> MarkerLay
     try:
         return _placed(table, face, file, has_points)
     except SignfaceError as error:
-        raise SignfaceError(error.problem, file=file, hint=error.hint) from error
+        raise error.at(file) from error
 
 
 def _columns(file: Path) -> dict[str, np.ndarray]:

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from signface.content import Content
 from signface.errors import SignfaceError
 
 
-@dataclass(frozen=True)
-class Mesh:
+@dataclass(frozen=True, eq=False)
+class Mesh(Content):
     """A triangle mesh.
 
     Parameters

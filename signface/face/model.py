@@ -6,12 +6,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from signface.content import Content
 from signface.errors import SignfaceError
 from signface.face.mesh import Mesh
 
 
-@dataclass(frozen=True)
-class FaceModel:
+@dataclass(frozen=True, eq=False)
+class FaceModel(Content):
     """A blendshape face (Reverdy 2019, eq. 4.1 and 5.2): `neutral + sum_i weight_i * bases[i]`.
 
     Parameters
@@ -59,7 +60,7 @@ class FaceModel:
     identities: np.ndarray | None = None
     identity_names: tuple[str, ...] = ()
     name: str = "face"
-    history: tuple[str, ...] = field(default=())
+    history: tuple[str, ...] = field(default=(), compare=False)
     colours: np.ndarray | None = None
 
     def __post_init__(self) -> None:

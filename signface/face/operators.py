@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-import weakref
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy import sparse
@@ -18,7 +18,7 @@ from signface.face.model import FaceModel
 RESOLUTION = 0.02
 
 #: What was computed for faces that are still in use: several solvers are made for one face. A face does not change.
-_KNOWN: dict[int, tuple[weakref.ref[FaceModel], tuple[np.ndarray, np.ndarray]]] = {}
+_KNOWN: WeakKeyDictionary[FaceModel, tuple[np.ndarray, np.ndarray]] = WeakKeyDictionary()
 
 
 def stiffness_and_mass(mesh: Mesh) -> tuple[sparse.csr_matrix, np.ndarray]:
@@ -65,16 +65,9 @@ def thin_shell_matrices(face: FaceModel) -> tuple[np.ndarray, np.ndarray]:
     bending : (N, N) array
         `b_i' S (M + h^2 S)^-1 S b_j`, without unit; positive semidefinite.
     """
-    known = _KNOWN.get(id(face))
-    if known is not None and known[0]() is face:
-        return known[1]
-    matrices, key = _thin_shell_matrices(face), id(face)
-
-    def forget(_: weakref.ref[FaceModel]) -> None:
-        _KNOWN.pop(key, None)
-
-    _KNOWN[key] = weakref.ref(face, forget), matrices
-    return matrices
+    if face not in _KNOWN:
+        _KNOWN[face] = _thin_shell_matrices(face)
+    return _KNOWN[face]
 
 
 def _thin_shell_matrices(face: FaceModel) -> tuple[np.ndarray, np.ndarray]:

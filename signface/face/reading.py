@@ -120,7 +120,7 @@ def face_in_millimetres(raw: RawFace, path: Path) -> FaceModel:
             history=(f"read_face {path.name} ({unit})",),
         )
     except SignfaceError as error:
-        raise SignfaceError(error.problem, file=path, hint=error.hint) from error
+        raise error.at(path) from error
 
 
 def read_identities() -> tuple[np.ndarray, tuple[str, ...]]:

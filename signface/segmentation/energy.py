@@ -6,12 +6,13 @@
 
 from __future__ import annotations
 
-import weakref
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.ndimage import correlate1d, median_filter
 
+from signface.content import Content
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 
@@ -20,11 +21,11 @@ FINE_RATE = 100.0
 
 #: Curves of takes that are still in use: segmentation, ELAN's curves and the figure all want them. Descriptors do not
 #: change.
-_KNOWN: dict[tuple[int, float, float, float], Energies] = {}
+_KNOWN: WeakKeyDictionary[Descriptors, dict[tuple[float, float, float], Energies]] = WeakKeyDictionary()
 
 
-@dataclass(frozen=True)
-class Energies:
+@dataclass(frozen=True, eq=False)
+class Energies(Content):
     """Energy curves of a take.
 
     Parameters
@@ -114,9 +115,9 @@ def energies(
         )
     if window_s <= 0 or time_constant_s <= 0 or pulse_s < 0:
         raise SignfaceError("the window and the time constant of the energies must be positive seconds")
-    key = (id(descriptors), window_s, time_constant_s, pulse_s)
-    if key in _KNOWN:
-        return _KNOWN[key]
+    known, key = _KNOWN.setdefault(descriptors, {}), (window_s, time_constant_s, pulse_s)
+    if key in known:
+        return known[key]
     weights = bridged(descriptors)
     factor = max(1, int(np.ceil(FINE_RATE / descriptors.rate)))
     time, weights = _refined(descriptors.time, weights, factor)
@@ -128,8 +129,7 @@ def energies(
         for order in (1, 2)
     )
     curves = Energies(time=time, velocity=speed, acceleration=change, time_constant_s=time_constant_s)
-    _KNOWN[key] = curves
-    weakref.finalize(descriptors, _KNOWN.pop, key, None)
+    known[key] = curves
     return curves
 
 

@@ -13,14 +13,15 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from signface.content import Content
 from signface.errors import SignfaceError
 from signface.files import whole_file
 
 KINDS = ("stable", "transition")
 
 
-@dataclass(frozen=True)
-class Segments:
+@dataclass(frozen=True, eq=False)
+class Segments(Content):
     """A table of segments in time order, without overlap.
 
     Parameters
@@ -36,7 +37,7 @@ class Segments:
 
     table: pd.DataFrame
     name: str = "take"
-    history: tuple[str, ...] = field(default=())
+    history: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         table = self.table.reset_index(drop=True)

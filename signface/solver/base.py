@@ -12,6 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
+from signface.content import Content
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
@@ -27,8 +28,8 @@ DEPENDENT = 1e-7
 OPPOSED = -1.0 + 1e-9
 
 
-@dataclass(frozen=True)
-class Solution:
+@dataclass(frozen=True, eq=False)
+class Solution(Content):
     """Weights of a batch of frames.
 
     Parameters

@@ -19,7 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from signface.corpus.manifest import Corpus, TakeEntry, read_corpus, write_takes
-from signface.descriptors import Descriptors, write_weights
+from signface.descriptors import Descriptors
+from signface.descriptors_files import write_weights
 from signface.elan.document import is_unmodified_output, read_document
 from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError

@@ -12,11 +12,12 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
+from signface.frames import Timed
 from signface.takes.filtering import CUTOFF_HZ, filtered, note, reach
 from signface.takes.gaps import LONG_S, SHORT_S, GapFiller
 from signface.takes.labels import find_labels
 from signface.takes.recording import PIECE, Recording, pieces
-from signface.takes.take import Take, frame_at
+from signface.takes.take import Take
 
 #: Goes through pieces, showing how far we are: `progress(pieces, "cleaning")`, as `signface.cli.progress.progress`.
 Progress = Callable[[Sequence[tuple[int, int]], str], Iterable[tuple[int, int]]]
@@ -27,7 +28,7 @@ def silently(items: Sequence[tuple[int, int]], what: str) -> Iterable[tuple[int,
     return items
 
 
-class CleanRecording:
+class CleanRecording(Timed):
     """The markers of a layout in a recording, with gaps filled and filtered; itself a `Recording`.
 
     Parameters
@@ -46,6 +47,11 @@ class CleanRecording:
     SignfaceError
         The recording does not have the markers, or a parameter is out of range.
     """
+
+    rate: float
+    start: float
+    name: str
+    n_frames: int
 
     def __init__(
         self,
@@ -93,10 +99,6 @@ class CleanRecording:
         full = self._gaps.fill(given, outer, (begin, end))[first - outer : last - outer]
         smooth = filtered(full, self.rate, self._cutoff_hz, self._method)
         return smooth[begin - first : end - first].copy() if last - first > end - begin else smooth
-
-    def frame_at(self, seconds: float) -> int:
-        """Index of the frame nearest to a time in seconds; see `Take.frame_at`."""
-        return frame_at(self, seconds)
 
     def view(self, most: int, *, piece: int = PIECE, progress: Progress = silently) -> Take:
         """All of it, or evenly spaced frames where it has more than `most`, as a take at the lower rate."""

@@ -9,18 +9,31 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-from signface.takes.take import Take, Timed, frame_at
+from signface.frames import TimedArrays
+from signface.takes.take import Take
 
 #: Frames worked on at a time: 46 markers then take 18 MB, and the two minutes of an ordinary take are two pieces.
 PIECE = 16384
 
 
-class Recording(Timed, Protocol):
+class Recording(Protocol):
     """Trajectories of markers, in memory or on disk; attributes as of `Take`."""
+
+    @property
+    def rate(self) -> float: ...
+
+    @property
+    def start(self) -> float: ...
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def n_frames(self) -> int: ...
 
     @property
     def labels(self) -> tuple[str, ...]: ...
@@ -34,7 +47,7 @@ class Recording(Timed, Protocol):
 
 
 @dataclass(frozen=True)
-class TakeFile:
+class TakeFile(TimedArrays):
     """A recording on disk.
 
     Parameters
@@ -66,10 +79,6 @@ class TakeFile:
         positions[~np.isfinite(positions).all(axis=2)] = np.nan
         return positions
 
-    def frame_at(self, seconds: float) -> int:
-        """Index of the frame nearest to a time in seconds; see `Take.frame_at`."""
-        return frame_at(self, seconds)
-
     def whole(self) -> Take:
         """All of it, in memory."""
         return Take(
@@ -80,6 +89,12 @@ class TakeFile:
             name=self.name,
             history=self.history,
         )
+
+    def _rows(self, begin: int, end: int) -> dict[str, Any]:
+        def read(first: int, last: int, step: int) -> np.ndarray:
+            return self.read(begin + first, min(begin + last, end), step)
+
+        return {"read": read, "n_frames": end - begin}
 
 
 def pieces(frames: int, length: int = PIECE) -> list[tuple[int, int]]:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import numpy as np
 
+from signface.content import Content
 from signface.errors import SignfaceError
+from signface.frames import TimedArrays
 
 
-@dataclass(frozen=True)
-class Take:
+@dataclass(frozen=True, eq=False)
+class Take(TimedArrays, Content):
     """Trajectories of markers.
 
     Parameters
@@ -41,7 +42,7 @@ class Take:
     rate: float
     start: float = 0.0
     name: str = "take"
-    history: tuple[str, ...] = field(default=())
+    history: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         positions = np.array(self.positions, dtype=np.float64)
@@ -70,26 +71,6 @@ class Take:
         """Number of frames F."""
         return self.positions.shape[0]
 
-    @property
-    def duration(self) -> float:
-        """Duration in seconds: frames over rate."""
-        return self.n_frames / self.rate
-
-    @property
-    def time(self) -> np.ndarray:
-        """(F,) time of each frame in seconds."""
-        return self.start + np.arange(self.n_frames) / self.rate
-
-    def frame_at(self, seconds: float) -> int:
-        """Index of the frame nearest to a time in seconds.
-
-        Raises
-        ------
-        SignfaceError
-            The time lies outside the take.
-        """
-        return frame_at(self, seconds)
-
     def frames(self, begin: int, end: int, step: int = 1) -> np.ndarray:
         """(K, M, 3) positions of every `step`-th frame from `begin` to before `end`."""
         return self.positions[begin:end:step]
@@ -111,31 +92,3 @@ class Take:
     def changed(self, operation: str, **fields: object) -> Take:
         """A copy with some fields replaced and `operation` appended to its history."""
         return replace(self, history=(*self.history, operation), **fields)  # type: ignore[arg-type]
-
-
-class Timed(Protocol):
-    """What has frames at times."""
-
-    @property
-    def rate(self) -> float: ...
-
-    @property
-    def start(self) -> float: ...
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def n_frames(self) -> int: ...
-
-
-def frame_at(recording: Timed, seconds: float) -> int:
-    """Index of the frame of a recording that is nearest to a time; see `Take.frame_at`."""
-    frame = round((seconds - recording.start) * recording.rate) if np.isfinite(seconds) else -1
-    if not 0 <= frame < recording.n_frames:
-        last = recording.start + (recording.n_frames - 1) / recording.rate
-        raise SignfaceError(
-            f"{recording.name}: the time {seconds:g} s is outside the take",
-            hint=f"give a time from {recording.start:.3f} to {last:.3f} s",
-        )
-    return frame

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from signface.cli.main import main
-from signface.descriptors import read_weights
+from signface.descriptors_files import read_weights
 from signface.face.files.gltf import write_face
 from signface.face.layout_files import read_layout, write_layout
 from signface.synth.corpus import write_c3d

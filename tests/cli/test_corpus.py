@@ -13,7 +13,7 @@ import pytest
 from signface.cli.main import main
 from signface.corpus.examples import solve_examples
 from signface.corpus.manifest import TakeEntry, read_corpus, write_takes
-from signface.descriptors import write_weights
+from signface.descriptors_files import write_weights
 from signface.elan.writing import write_eaf
 from signface.evaluation.measure import measure
 from signface.label.labellers import NAMES
@@ -187,7 +187,7 @@ def newer_store(folder):
     )
     for file in (folder / "descriptors").rglob("*.parquet"):
         table = pq.read_table(file, partitioning=None)
-        about = json.loads(table.schema.metadata[b"signface"]) | {"format": 99}
+        about = json.loads(pq.read_metadata(file).metadata[b"signface"]) | {"format": 99}
         pq.write_table(table.replace_schema_metadata({"signface": json.dumps(about)}), file)
 
 

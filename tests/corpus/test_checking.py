@@ -12,7 +12,7 @@ from signface.cli.main import main
 from signface.corpus.checking import TakeCheck, check_corpus, check_take
 from signface.corpus.manifest import TakeEntry, write_takes
 from signface.corpus.origin import make_recipe
-from signface.descriptors import write_weights
+from signface.descriptors_files import write_weights
 from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
 from signface.segmentation.segments import Segments

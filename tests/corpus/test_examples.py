@@ -7,7 +7,7 @@ import pytest
 
 from signface.corpus.examples import solve_examples
 from signface.corpus.manifest import Corpus, TakeEntry
-from signface.descriptors import write_weights
+from signface.descriptors_files import write_weights
 from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
 from tests.fixtures.hand_made import example

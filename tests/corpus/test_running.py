@@ -18,7 +18,7 @@ from signface.cli.main import main
 from signface.corpus.cluster import WorkerDied, on_cores
 from signface.corpus.manifest import Corpus, TakeEntry, read_corpus, write_takes
 from signface.corpus.running import BEFORE, CORRECTED, DONE, FAILED, run_corpus
-from signface.descriptors import write_weights
+from signface.descriptors_files import write_weights
 from signface.errors import SignfaceError
 from signface.label.persistence import save_model
 from signface.learn.training import train_model

@@ -22,8 +22,9 @@ from signface.cli.main import main
 from signface.corpus.examples import solve_examples
 from signface.corpus.manifest import Corpus, TakeEntry, read_corpus, write_takes
 from signface.corpus.origin import Origin, find_origin, make_recipe, take_name
-from signface.corpus.store import DescriptorStore, open_store, read_provenance, read_stored
-from signface.descriptors import Descriptors, write_weights
+from signface.corpus.store import DescriptorStore, open_store, read_provenance
+from signface.descriptors import Descriptors
+from signface.descriptors_files import read_weights, write_weights
 from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
 from signface.files import bundled_corpus, shipped
@@ -165,7 +166,7 @@ def test_a_damaged_file_is_solved_again(origin, laugh, tmp_path, harm):
     file.write_bytes(harmed)
     assert store.read(origin) is None
     with pytest.raises(SignfaceError, match=r"laugh\.parquet"):
-        read_stored(file)
+        read_weights(file)
     store.write(origin, laugh)
     assert store.read(origin) is not None
 
@@ -174,7 +175,7 @@ def test_a_store_of_a_newer_version_is_refused_and_left_alone(origin, laugh, tmp
     store = DescriptorStore(tmp_path)
     file = store.write(origin, laugh)
     table = pq.read_table(file, partitioning=None)
-    about = json.loads(table.schema.metadata[b"signface"]) | {"format": 99}
+    about = json.loads(pq.read_metadata(file).metadata[b"signface"]) | {"format": 99}
     pq.write_table(table.replace_schema_metadata({"signface": json.dumps(about)}), file)
     newer = file.read_bytes()
     for attempt in (lambda: store.read(origin), lambda: DescriptorStore(tmp_path), lambda: open_store(tmp_path)):

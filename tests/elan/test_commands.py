@@ -13,7 +13,8 @@ import pytest
 from lxml import etree
 
 from signface.cli.main import main
-from signface.descriptors import Descriptors, write_weights
+from signface.descriptors import Descriptors
+from signface.descriptors_files import write_weights
 from signface.elan.document import read_document, tier_rows
 from signface.elan.mapping import ChannelRule, read_mapping
 from signface.elan.options import EafOptions

@@ -18,7 +18,7 @@ from sklearn.preprocessing import StandardScaler
 from signface.annotation import annotate
 from signface.cli.main import main
 from signface.corpus.manifest import TakeEntry, write_takes
-from signface.descriptors import write_weights
+from signface.descriptors_files import write_weights
 from signface.elan.reference import read_reference
 from signface.elan.writing import write_eaf
 from signface.evaluation.protocol import evaluate, folds_of

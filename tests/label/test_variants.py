@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from sklearn.base import clone
 
 from signface.cli.main import main
-from signface.descriptors import Descriptors, read_weights, write_weights
+from signface.descriptors import Descriptors
+from signface.descriptors_files import read_weights, write_weights
 from signface.elan.reference import read_reference
 from signface.errors import SignfaceError
 from signface.evaluation.protocol import evaluate, folds_of

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from signface.descriptors import Descriptors, write_weights
+from signface.descriptors import Descriptors
+from signface.descriptors_files import write_weights
 from signface.errors import SignfaceError
 from signface.face.camera import Camera
 from signface.face.mesh import Mesh

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from signface.cli.main import main
-from signface.descriptors import Descriptors, WeightsWriter, read_weights, write_weights
+from signface.descriptors import Descriptors
+from signface.descriptors_files import WeightsWriter, read_weights, write_weights
 from signface.errors import SignfaceError
 from signface.face.layout_files import read_layout
 from signface.solver import preparation

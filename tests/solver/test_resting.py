@@ -47,7 +47,7 @@ def test_every_resting_pose_is_a_candidate(face, layout):
 
 
 def test_the_bundled_takes_rest_where_they_are_known_to(mini, face, layout):
-    from signface.descriptors import read_weights
+    from signface.descriptors_files import read_weights
 
     for entry in mini.takes:
         take = read_take(entry.path)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from signface.cli.main import main
-from signface.descriptors import Descriptors, write_weights
+from signface.descriptors import Descriptors
+from signface.descriptors_files import write_weights
 from signface.errors import SignfaceError
 from signface.render.film import read_film
 from signface.study.design import read_study

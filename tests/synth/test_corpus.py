@@ -8,7 +8,7 @@ import pytest
 
 from signface.cli.main import main
 from signface.corpus.manifest import read_corpus
-from signface.descriptors import read_weights
+from signface.descriptors_files import read_weights
 from signface.elan.reference import read_reference
 from signface.errors import SignfaceError
 from signface.segmentation.segments import read_segments

@@ -9,7 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from signface.cli.main import main
-from signface.descriptors import Descriptors, write_weights
+from signface.descriptors import Descriptors
+from signface.descriptors_files import write_weights
 from signface.errors import SignfaceError
 from signface.takes.formats.c3d import write_c3d
 from signface.takes.formats.table import write_table

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from signface.cli.main import main
-from signface.descriptors import Descriptors, write_weights
+from signface.descriptors import Descriptors
+from signface.descriptors_files import write_weights
 from signface.takes.formats.c3d import write_c3d
 from signface.takes.take import Take
 from tests.fixtures.takes_files import moving_face, with_gaps

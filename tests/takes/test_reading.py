@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from signface.descriptors import Descriptors, write_weights
+from signface.descriptors import Descriptors
+from signface.descriptors_files import write_weights
 from signface.errors import SignfaceError
 from signface.takes.formats.c3d import read_c3d, write_c3d
 from signface.takes.formats.table import write_table

@@ -146,8 +146,8 @@ def report_html(
     import numpy
     import scipy
 
+    from signface.extras import version_of
     from signface.report.templates import environment
-    from signface.study.extras import version_of
 
     responses = analysis.responses
     drawn = _figures(analysis) if figures is None else figures

@@ -18,7 +18,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from signface.descriptors import Descriptors, read_weights
+from signface.descriptors import Descriptors
+from signface.descriptors_files import read_weights
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
@@ -327,7 +328,7 @@ def make_synthetic_takes(folder: Path, signer: int, *, show: Callable[[Iterable]
     show : callable
         Wraps the list of takes, for a progress bar.
     """
-    from signface.descriptors import write_weights
+    from signface.descriptors_files import write_weights
     from signface.synth.corpus import make_take, plan_corpus, write_c3d
 
     jobs = [job for job in plan_corpus(signers=signer + 1, seed=6, kinds=["IE"]) if job.signer == signer]

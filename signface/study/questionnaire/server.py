@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from signface.errors import SignfaceError
+from signface.extras import needed
 from signface.study.design import Study
-from signface.study.extras import needed
 from signface.study.questionnaire.security import HEADERS, Refusal, read_form
 from signface.study.questionnaire.store import Refused, Store
 from signface.study.questionnaire.web_pages import Questionnaire, log
@@ -44,7 +44,7 @@ def make_app(study: Study, store: Store, organiser_token: str) -> Starlette:
     SignfaceError
         The extra `study` is not installed, or a language has no words for the pages.
     """
-    needed("starlette")
+    needed("starlette", "study")
     from starlette.applications import Starlette
     from starlette.concurrency import run_in_threadpool
     from starlette.exceptions import HTTPException
@@ -148,7 +148,7 @@ def serve(study: Study, store: Store, *, host: str = "127.0.0.1", port: int = 80
     """
     import socket
 
-    uvicorn = needed("uvicorn")
+    uvicorn = needed("uvicorn", "study")
     handler = RotatingFileHandler(study.folder / "refusals.log", maxBytes=1_000_000, backupCount=3, encoding="utf-8")
     handler.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
     log.addHandler(handler)

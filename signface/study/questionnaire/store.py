@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from signface.errors import SignfaceError
-from signface.study.extras import needed
+from signface.extras import needed
 from signface.study.questionnaire.database import make_engine, make_tables
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def open_store(url_or_file: str | PathLike[str]) -> Store:
     SignfaceError
         The extra `study` is not installed, the URL is not understood, or the database cannot be opened.
     """
-    sqlalchemy = needed("sqlalchemy")
+    sqlalchemy = needed("sqlalchemy", "study")
     text = str(url_or_file)
     is_url = "://" in text
     if is_url and not text.startswith(("postgresql://", "postgres://", "postgresql+psycopg://", "sqlite://")):
@@ -88,7 +88,7 @@ def open_store(url_or_file: str | PathLike[str]) -> Store:
     if not is_url:
         Path(text).parent.mkdir(parents=True, exist_ok=True)
     if is_url and not text.startswith("sqlite"):
-        needed("psycopg")
+        needed("psycopg", "study")
         text = "postgresql+psycopg://" + text.partition("://")[2]
     where = "the database" if is_url else text
     try:

@@ -13,8 +13,8 @@ import secrets
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from signface.extras import needed
 from signface.study.design import Study
-from signface.study.extras import needed
 from signface.study.questionnaire.questionnaire import Page, check_answer, pages_of
 from signface.study.questionnaire.security import FormKey, Refusal
 from signface.study.questionnaire.store import Participant, Refused, Store
@@ -42,7 +42,7 @@ class Questionnaire:
     """
 
     def __init__(self, study: Study, store: Store, organiser_token: str) -> None:
-        jinja2 = needed("jinja2")
+        jinja2 = needed("jinja2", "study")
         self.study, self.store, self._organiser_token = study, store, organiser_token
         self.key = FormKey(store.setting("secret", secrets.token_hex(32)))
         self.words = {language: wording(language, study.words) for language in study.languages}

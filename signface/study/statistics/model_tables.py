@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from signface.study.extras import needed
+from signface.extras import needed
 from signface.study.responses import Responses
 from signface.study.statistics.contingency import cochran, mcnemar
 from signface.study.statistics.intervals import difference_intervals
@@ -156,9 +156,9 @@ def _averaged(table: pd.DataFrame, column: str, methods: list[str]) -> TestResul
         return _none("one method" if len(methods) < 2 else "constant answers")
     if people < LEAST_CLUSTERS:
         return _none(f"{people} < {LEAST_CLUSTERS} participants")
-    equations = needed("statsmodels.genmod.generalized_estimating_equations")
-    family = needed("statsmodels.genmod.families").Binomial()
-    independence = needed("statsmodels.genmod.cov_struct").Independence()
+    equations = needed("statsmodels.genmod.generalized_estimating_equations", "study")
+    family = needed("statsmodels.genmod.families", "study").Binomial()
+    independence = needed("statsmodels.genmod.cov_struct", "study").Independence()
     table = table.sort_values("participant", kind="stable")
     design = pd.DataFrame({method: (table["method"] == method).astype(float) for method in methods[1:]})
     answers = table[column].reset_index(drop=True)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from itertools import combinations
 
-from signface.study.extras import needed
+from signface.extras import needed
 from signface.study.responses import Responses
 from signface.study.statistics.tables import StudyTable
 from signface.study.statistics.thesis_tables import participant_means
@@ -45,7 +45,7 @@ def smallest_difference(spread: float, participants: int, *, alpha: float = 0.05
     """
     if participants < 3 or not spread > 0:
         return math.nan
-    solver = needed("statsmodels.stats.power").TTestPower()
+    solver = needed("statsmodels.stats.power", "study").TTestPower()
     effect = solver.solve_power(effect_size=None, nobs=participants * EFFICIENCY, alpha=alpha, power=power)
     return float(effect) * spread
 
@@ -61,7 +61,7 @@ def participants_needed(difference: float, spread: float, *, alpha: float = 0.05
     """
     if not spread > 0 or not difference > 0:
         return None
-    solver = needed("statsmodels.stats.power").TTestPower()
+    solver = needed("statsmodels.stats.power", "study").TTestPower()
     effect = difference / spread
     if effect > 3:  # the solver has no root there; three participants with differences that large are enough
         return 3

@@ -78,7 +78,7 @@ def open_c3d(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
     try:
         factor, note = unit_factor(units, unit, markers=len(kept), sample=sample)
     except SignfaceError as error:
-        raise SignfaceError(error.problem, file=file, hint=error.hint) from error
+        raise error.at(file) from error
     return TakeFile(
         tuple(names),
         structure.rate,

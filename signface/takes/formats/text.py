@@ -354,7 +354,7 @@ def marker_rows(
     try:
         factor, note = unit_factor(units, unit, markers=len(labels), sample=sample)
     except SignfaceError as error:
-        raise SignfaceError(error.problem, file=file, hint=error.hint) from error
+        raise error.at(file) from error
     return TakeFile(
         tuple(labels),
         rate,

@@ -1,10 +1,11 @@
-"""Weights that signface wrote itself: its CSV and Parquet files (`signface.descriptors`), as a format of recordings."""
+"""Weights that signface wrote itself (`signface.descriptors_files`), as a format of recordings."""
 
 from __future__ import annotations
 
 from os import PathLike
 
-from signface.descriptors import Descriptors, is_weights_table, read_weights
+from signface.descriptors import Descriptors
+from signface.descriptors_files import is_weights_table, read_weights
 from signface.takes.formats.registry import FileHead, register_format
 
 

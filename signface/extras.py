@@ -1,4 +1,4 @@
-"""Packages that only studies need: the extra `study`.
+"""Packages that only some of signface needs: the extras of `pip install 'signface[...]'`.
 
 - `needed`: import one, or say what to install.
 - `version_of`: the version of an installed package.
@@ -12,13 +12,18 @@ from types import ModuleType
 from signface.errors import SignfaceError
 
 
-def needed(module: str) -> ModuleType:
-    """Import a module of the extra `study`.
+def needed(module: str, extra: str) -> ModuleType:
+    """Import a module of an extra.
 
     Raises
     ------
     SignfaceError
         It is not installed; the message names the extra.
+
+    Examples
+    --------
+    >>> needed("pandas", "study").DataFrame({"marker": ["LBRO"]}).shape
+    (1, 1)
     """
     try:
         return importlib.import_module(module)
@@ -26,7 +31,7 @@ def needed(module: str) -> ModuleType:
         if error.name != module.partition(".")[0]:
             raise
         raise SignfaceError(
-            f"the package {error.name} is not installed", hint="pip install 'signface[study]'"
+            f"the package {error.name} is not installed", hint=f"pip install 'signface[{extra}]'"
         ) from error
 
 

@@ -1,0 +1,66 @@
+"""Equality of the data objects: by what they hold."""
+
+import copy
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from signface.descriptors import Descriptors
+from signface.face.layout import MarkerLayout
+from signface.face.mesh import Mesh
+from signface.face.model import FaceModel
+from signface.segmentation.energy import energies
+from signface.segmentation.segments import Segments
+from signface.signer import Signer, SignerBases, SignerLevel
+from signface.takes.take import Take
+
+WEIGHTS = np.array([[0.0, np.nan], [0.5, 1.0], [0.2, 0.3], [0.1, 0.4]])
+MESH = Mesh(np.eye(3), np.array([[0, 1, 2]]))
+BASES = SignerBases(("jawOpen",), ("CHIN",), np.ones((1, 3)))
+LEVEL = SignerLevel(("jawOpen",), np.array([np.nan]), np.ones(1))
+TABLE = pd.DataFrame({"start_s": [0.0, 1.0], "end_s": [1.0, 2.0], "kind": "stable", "label": ["J", None]})
+
+#: An object, and one that differs in a single value.
+PAIRS = [
+    (Descriptors(WEIGHTS, ("a", "b"), 50.0), {"weights": WEIGHTS * 2}),
+    (Descriptors(WEIGHTS, ("a", "b"), 50.0), {"deviation": WEIGHTS}),
+    (Descriptors(WEIGHTS, ("a", "b"), 50.0), {"start": 1.0}),
+    (Take(np.ones((3, 2, 3)), ("a", "b"), 50.0), {"labels": ("a", "c")}),
+    (MESH, {"vertices": 2 * np.eye(3)}),
+    (FaceModel(MESH, np.ones((1, 3, 3)), ("jawOpen",)), {"mesh": replace(MESH, vertices=2 * np.eye(3))}),
+    (FaceModel(MESH, np.ones((1, 3, 3)), ("jawOpen",)), {"colours": np.ones((3, 3))}),
+    (MarkerLayout.on_vertices({"CHIN": 1}, ["HEAD"]), {"roles": ("head", "head")}),
+    (Segments(TABLE), {"table": TABLE.assign(label=["J", "N"])}),
+    (BASES, {"displacements": np.zeros((1, 3))}),
+    (LEVEL, {"spread": np.zeros(1)}),
+    (Signer("Eva", BASES, LEVEL), {"level": replace(LEVEL, spread=np.zeros(1))}),
+    (energies(Descriptors(WEIGHTS, ("a", "b"), 50.0)), {"velocity": np.zeros(8)}),
+]
+
+
+@pytest.mark.parametrize(("thing", "change"), PAIRS, ids=lambda value: type(value).__name__)
+def test_equal_is_what_holds_the_same(thing, change):
+    for twin in (copy.deepcopy(thing), pickle.loads(pickle.dumps(thing)), replace(thing)):
+        assert thing == twin
+        assert hash(thing) == hash(twin)
+        assert {thing: 1}[twin] == 1
+    other = replace(thing, **change)
+    assert thing != other
+    assert other != thing
+    assert thing != "another thing"
+
+
+def test_how_it_came_about_does_not_count():
+    take = Descriptors(WEIGHTS, ("a", "b"), 50.0)
+    assert take == take.changed("looked at")
+    assert hash(take) == hash(take.changed("looked at"))
+    assert replace(BASES, source="eva.csv") == BASES
+    assert take != Descriptors(WEIGHTS, ("a", "b"), 50.0, name="another")
+
+
+def test_an_array_is_nothing_and_nothing_is_an_array():
+    with_deviation = Descriptors(WEIGHTS, ("a", "b"), 50.0, deviation=WEIGHTS)
+    assert (with_deviation == replace(with_deviation, deviation=None)) is False
