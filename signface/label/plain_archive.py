@@ -1,10 +1,14 @@
-"""Reading the skops archive of a model that holds nothing but arrays and plain values, without skops.
+"""Models of our own on disk, without skops: what consists of arrays and plain values.
 
-- `read_plain`: the model, or None where the archive holds anything else, which is then skops' to read.
+- `is_plain`: whether an object is a model of ours that consists of them.
+- `plain_entries`: the entries of an archive that hold a model.
+- `read_plain`: the model in them.
 
-Importing skops and the modules of scikit-learn that it imports takes half a second or more. A recurrent network needs
-none of them: its archive is a JSON tree of containers, numbers, texts and `.npy` files. Of any other type this reads
-nothing, so that it trusts less than skops does: containers, arrays without objects, and the classes of `OURS`.
+Importing skops and what it imports of scikit-learn takes a second or more, which a recurrent network needs nothing of.
+An archive holds a tree in JSON, `model.json`, and beside it one `.npy` file for each array, so that `numpy.load` opens
+it, too. In the tree a text, a number, a truth value, null and a list stand for themselves; everything else is an object
+of one key: `array` or `scalar` (numpy's, the name of its file), `tuple`, `dict` (a list of keys and values) and `model`
+(one of `MODELS`, with the values of its attributes). Nothing else is read, and nothing of the archive is run.
 """
 
 from __future__ import annotations
@@ -13,112 +17,93 @@ import importlib
 import io
 import json
 import zipfile
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-SCHEMA = "schema.json"
+TREE = "model.json"
 
-#: The protocol of the archives that are known here; newer ones may mean something else.
-PROTOCOL = 2
-
-#: Models that consist of arrays and plain values.
-OURS = (
-    "signface.sequence.crf.ChainLabeller",
-    "signface.sequence.gru.RecurrentLabeller",
-    "signface.label.intensity.IntensityClassifier",
-)
-
-#: Names of modules and of attributes in files that older versions wrote, and what they are called now.
-RENAMED_MODULES = {
-    "signface.label.crf": "signface.sequence.crf",
-    "signface.label.gru": "signface.sequence.gru",
-    "signface.label.sequence": "signface.sequence.hsmm",
-}
-RENAMED_ATTRIBUTES = {
-    "border_weight": "boundary_weight",
-    "border_classifier": "boundary_classifier",
-    "border_mean_": "boundary_mean_",
-    "border_scale_": "boundary_scale_",
-    "borders_": "boundaries_",
+#: Models that consist of arrays and plain values, and where they stand.
+MODELS = {
+    "ChainLabeller": "signface.sequence.crf",
+    "IntensityClassifier": "signface.label.intensity",
+    "RecurrentLabeller": "signface.sequence.gru",
 }
 
-CONTAINERS = {"ListNode": list, "TupleNode": tuple}
-KEYS = {"builtins.str": str, "builtins.int": int}
+
+def is_plain(model: object) -> bool:
+    """Whether a model is one of `MODELS`."""
+    return MODELS.get(type(model).__name__) == type(model).__module__
 
 
-class _OtherError(Exception):
-    """The archive holds something that is not plain."""
+def plain_entries(models: Mapping[str, object]) -> dict[str, bytes]:
+    """The entries of an archive, by name, that hold models of `MODELS`, each under a name.
+
+    Raises
+    ------
+    TypeError
+        A model holds something else than arrays and plain values.
+    """
+    entries: dict[str, bytes] = {}
+    files: dict[int, str] = {}  # an array that a model holds twice is written once
+
+    def node(value: Any, path: str) -> Any:
+        if value is None or type(value) in (str, bool, int, float):
+            return value
+        if type(value) is list:
+            return [node(item, f"{path}.{number}") for number, item in enumerate(value)]
+        if type(value) is tuple:
+            return {"tuple": [node(item, f"{path}.{number}") for number, item in enumerate(value)]}
+        if type(value) is dict:
+            return {"dict": [[node(key, path), node(item, f"{path}.{key}")] for key, item in value.items()]}
+        if isinstance(value, np.ndarray | np.generic):
+            file = files.setdefault(id(value), f"{path}.npy")
+            written = io.BytesIO()
+            np.save(written, value, allow_pickle=False)
+            entries[file] = written.getvalue()
+            return {"array" if isinstance(value, np.ndarray) else "scalar": file}
+        if is_plain(value):
+            attributes = {name: node(item, f"{path}.{name}") for name, item in vars(value).items()}
+            return {"model": [type(value).__name__, attributes]}
+        raise TypeError(f"{path} is a {type(value).__name__}, neither an array nor a plain value")
+
+    tree = {name: node(model, name) for name, model in models.items()}
+    entries[TREE] = json.dumps(tree, indent=1, ensure_ascii=False).encode()
+    return entries
 
 
-def read_plain(archive: zipfile.ZipFile) -> Any:
-    """The object in a skops archive; None where it holds more than `OURS`, arrays and plain values.
+def read_plain(archive: zipfile.ZipFile) -> dict[str, Any]:
+    """The models in an archive, by name; none where it holds no `model.json`.
 
     Raises
     ------
     Exception
-        Of any kind, where the archive is damaged.
+        Of any kind, where the archive is damaged or holds anything else.
     """
-    schema = read_schema(archive)
-    if schema.get("protocol") != PROTOCOL:
-        return None
-    try:
-        return _value(schema, archive, {})
-    except _OtherError:
-        return None
+    arrays: dict[str, np.ndarray] = {}
 
-
-def read_schema(archive: zipfile.ZipFile) -> Any:
-    """The schema of a skops archive, with today's names of our modules and of what models hold."""
-
-    def visit(node: Any) -> Any:
+    def value(node: Any) -> Any:
         if isinstance(node, list):
-            return [visit(item) for item in node]
+            return [value(item) for item in node]
         if not isinstance(node, dict):
             return node
-        renamed = {RENAMED_ATTRIBUTES.get(key, key): visit(value) for key, value in node.items()}
-        if renamed.get("__module__") in RENAMED_MODULES:
-            renamed["__module__"] = RENAMED_MODULES[renamed["__module__"]]
-        return renamed
+        ((kind, content),) = node.items()
+        if kind in ("array", "scalar"):
+            if content not in arrays:
+                arrays[content] = np.load(io.BytesIO(archive.read(content)), allow_pickle=False)
+            return arrays[content] if kind == "array" else arrays[content][()]
+        if kind == "tuple":
+            return tuple(value(item) for item in content)
+        if kind == "dict":
+            return {value(key): value(item) for key, item in content}
+        if kind == "model":
+            name, attributes = content
+            model = object.__new__(getattr(importlib.import_module(MODELS[name]), name))
+            vars(model).update({attribute: value(item) for attribute, item in attributes.items()})
+            return model
+        raise ValueError(f"{kind} is nothing that a model consists of")
 
-    return visit(json.loads(archive.read(SCHEMA)))
-
-
-def _name(node: dict[str, Any]) -> str:
-    return f"{node['__module__']}.{node['__class__']}"
-
-
-def _value(node: dict[str, Any], archive: zipfile.ZipFile, known: dict[int, Any]) -> Any:
-    """What a node of the tree stands for; what was met before under the same number is the same object."""
-    number = node.get("__id__")
-    if number in known:
-        return known[number]
-    loader, name = node["__loader__"], _name(node)
-    value: Any
-    if loader == "JsonNode" and name == "builtins.str":
-        value = json.loads(node["content"])
-    elif loader in CONTAINERS and name == f"builtins.{CONTAINERS[loader].__name__}":
-        value = CONTAINERS[loader](_value(own, archive, known) for own in node["content"])
-    elif loader == "DictNode" and name == "builtins.dict":
-        keys = [KEYS.get(_name(own)) for own in node["key_types"]["content"]]
-        if None in keys:
-            raise _OtherError
-        entries = zip(keys, node["content"].items(), strict=True)
-        value = {kind(key): _value(own, archive, known) for kind, (key, own) in entries if kind is not None}
-    elif loader == "NdArrayNode" and node["type"] == "numpy" and name.startswith("numpy."):
-        value = np.load(io.BytesIO(archive.read(node["file"])), allow_pickle=False)
-        if name != "numpy.ndarray":
-            value = value[()]
-            if f"{type(value).__module__}.{type(value).__name__}" != name:
-                raise _OtherError
-    elif loader == "ObjectNode" and name in OURS:
-        state = _value(node["content"], archive, known)
-        module, _, kind = name.rpartition(".")
-        own = getattr(importlib.import_module(module), kind)
-        value = own.__new__(own)
-        value.__dict__.update(state)
-    else:
-        raise _OtherError
-    if number is not None:
-        known[number] = value
-    return value
+    if TREE not in archive.namelist():
+        return {}
+    return {name: value(node) for name, node in json.loads(archive.read(TREE)).items()}

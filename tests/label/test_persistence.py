@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,8 +18,11 @@ from sklearn.preprocessing import FunctionTransformer
 
 from signface.errors import SignfaceError
 from signface.files import shipped
+from signface.label.intensity import IntensityClassifier
 from signface.label.labellers import NAMES
-from signface.label.persistence import CARD, _without_padding, load_model, read_card, save_model
+from signface.label.labelling import find_segments
+from signface.label.persistence import CARD, load_model, read_card, save_model
+from signface.label.skops_archive import RENAMED_ATTRIBUTES, RENAMED_MODULES, without_padding
 from signface.label.vocabulary import AFFECTS
 from signface.learn.training import train_model
 from tests.fixtures.hand_made import corpus, example
@@ -82,7 +86,7 @@ def test_what_memory_holds_between_fields_is_not_written(dirt, count):
         nodes["a"], nodes["b"] = np.arange(count), 7
         written = io.BytesIO()
         np.save(written, nodes)
-        entries.append(_without_padding(written.getvalue()))
+        entries.append(without_padding(written.getvalue()))
     assert entries[0] == entries[1]
     np.testing.assert_array_equal(np.load(io.BytesIO(entries[1]))["a"], np.arange(count))
 
@@ -182,3 +186,52 @@ def test_the_shipped_classifier_fits_the_default_face_and_says_what_it_has_not_m
     assert "It has met no real signer." in text
     for score in card.scores.values():
         assert f"{score:.2f}" in text
+
+
+def as_before(model, file):
+    """Write a model as version 0.1 did: all of it by skops, under the names of then."""
+    both = {"labels": model.estimator, "intensity": model.intensity}
+    written = io.BytesIO(skops.io.dumps(model.estimator if model.intensity is None else both))
+    then = {name: old for table in (RENAMED_MODULES, RENAMED_ATTRIBUTES) for old, name in table.items()}
+    with zipfile.ZipFile(written) as archive, zipfile.ZipFile(file, "w") as old:
+        for name in archive.namelist():
+            content = archive.read(name)
+            if name == "schema.json":
+                text = content.decode()
+                for today, former in then.items():
+                    text = text.replace(json.dumps(today), json.dumps(former))
+                content = text.encode()
+            old.writestr(name, content)
+        old.writestr(CARD, json.dumps(model.card.__dict__))
+
+
+@pytest.mark.parametrize("classifier", ["knn1", "crf", "net-hsmm"])
+def test_a_file_of_an_older_version_answers_like_todays(classifier, tmp_path):
+    takes = corpus(("S1", "S2"))
+    intensity = IntensityClassifier()
+    intensity.bases_, intensity.levels_ = tuple(takes[0].descriptors.names), np.array([1, 2, 3])
+    intensity.lines_ = np.array([[2.0, -1.0], [2.0, -3.0]])
+    model = replace(train_model(takes, classifier=classifier), intensity=intensity)
+    as_before(model, tmp_path / "old.skops")
+    save_model(model, tmp_path / "today.skops")
+    old, today = load_model(tmp_path / "old.skops"), load_model(tmp_path / "today.skops")
+    for take in takes[:3]:
+        tables = [find_segments(take.descriptors, loaded).table for loaded in (old, today, model)]
+        assert tables[0].equals(tables[2])
+        assert tables[1].equals(tables[2])
+    save_model(old, tmp_path / "again.skops")
+    assert (tmp_path / "again.skops").read_bytes() == (tmp_path / "today.skops").read_bytes()
+
+
+@pytest.mark.parametrize(("name", "classifier"), [("default", "gru"), ("thesis-forest", "forest")])
+def test_the_shipped_classifiers_are_written_as_save_model_writes_them(name, classifier, tmp_path):
+    file = shipped("classifiers", ".skops")[name]
+    model = load_model(name)
+    assert model.card.classifier == classifier
+    with zipfile.ZipFile(file) as archive:
+        assert ("schema.json" in archive.namelist()) == (name != "default")
+    save_model(model, tmp_path / file.name)
+    with zipfile.ZipFile(file) as one, zipfile.ZipFile(tmp_path / file.name) as other:
+        assert {n: one.read(n) for n in one.namelist() if n.endswith(".npy")} == {
+            n: other.read(n) for n in other.namelist() if n.endswith(".npy")
+        }
