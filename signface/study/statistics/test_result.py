@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from signface.study.extras import needed
+from signface.extras import needed
 
 #: name: symbol and the bounds of a small, a medium and a large effect (Cohen 1988; Tomczak and Tomczak 2014).
 EFFECTS = {
@@ -111,5 +111,7 @@ def holm(p_values: ArrayLike) -> NDArray[np.float64]:
     corrected = np.array(p_values, float)
     made = ~np.isnan(corrected)
     if made.any():
-        corrected[made] = needed("statsmodels.stats.multitest").multipletests(corrected[made], method="holm")[1]
+        corrected[made] = needed("statsmodels.stats.multitest", "study").multipletests(corrected[made], method="holm")[
+            1
+        ]
     return corrected
