@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from signface.cli import study_analysis, study_render
 from signface.errors import SignfaceError
+
+if TYPE_CHECKING:
+    from signface.study.questionnaire.store import Store
 
 EXAMPLE = """  signface study new group-1 my-study
   signface study render my-study
@@ -130,7 +134,7 @@ def run_erase(arguments: argparse.Namespace) -> None:
     print(f"{arguments.participant}: erased, with {count} answers; erase them from exported files too")
 
 
-def _store(arguments: argparse.Namespace, folder: Path, *, existing: bool = False):
+def _store(arguments: argparse.Namespace, folder: Path, *, existing: bool = False) -> Store:
     from signface.study.questionnaire.store import open_store
 
     file = folder / "answers.sqlite"

@@ -78,7 +78,7 @@ def _judged_by_rows(take: Descriptors, spans: np.ndarray, model: TrainedModel) -
         offset += len(frames)
     chosen = logs.argmax(axis=1)
     if model.card.aggregate == "mean":
-        said = model.estimator.predict(means[known])  # type: ignore[attr-defined]
+        said = model.estimator.predict(means[known])
         chosen[known] = [model.card.labels.index(label) for label in said]
     nearest = np.flatnonzero(known)
     for blind in np.flatnonzero(~known):  # the expression before goes on, or at the start the one after was there
@@ -178,7 +178,7 @@ def find_segments(descriptors: Descriptors, model: TrainedModel, *, level: Signe
     """
     if not model.sequential:
         return label_segments(descriptors, segment(descriptors), model, level=level)
-    found = model.estimator.annotate(model.seen(descriptors, level))  # type: ignore[attr-defined]
+    found = model.estimator.annotate(model.seen(descriptors, level))
     table = found.table.copy()
     stable = (table["kind"] == "stable").to_numpy()
     sure = table["confidence"].to_numpy(float).copy()

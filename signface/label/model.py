@@ -172,7 +172,7 @@ class TrainedModel:
         """
         if len(weights) == 0:
             return np.zeros((0, len(self.card.labels)))
-        return self.estimator.predict_proba(weights)  # type: ignore[attr-defined]
+        return self.estimator.predict_proba(weights)
 
 
 def _few(names: list[str], most: int = 5) -> str:

@@ -17,6 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
 from os import PathLike
 from pathlib import Path
+from types import ModuleType
 from typing import TypeVar
 
 import numpy as np
@@ -203,7 +204,7 @@ def beside(pictures: list[np.ndarray], captions: list[str] | None = None) -> np.
     return np.asarray(image)
 
 
-def _ffmpeg():
+def _ffmpeg() -> ModuleType:
     try:
         import imageio_ffmpeg
     except ModuleNotFoundError as error:

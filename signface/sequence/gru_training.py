@@ -92,7 +92,7 @@ def make_network(inputs: int, units: int, outputs: int) -> Any:
     """
     torch = _torch()
 
-    class Network(torch.nn.Module):  # type: ignore[name-defined, misc]
+    class Network(torch.nn.Module):  # type: ignore[name-defined]
         def __init__(self) -> None:
             super().__init__()
             self.drop_features = torch.nn.Dropout(DROPPED_FEATURES)

@@ -326,7 +326,7 @@ class Store:
                 answers.c.participant, answers.c.stimulus, answers.c.question, answers.c.value
             ).order_by(answers.c.participant, answers.c.answered_at, answers.c.stimulus, answers.c.question)
             rows = connection.execute(query).tuples().all()
-        return [_participant(row) for row in people], [tuple(row) for row in rows]  # type: ignore[misc]
+        return [_participant(row) for row in people], [tuple(row) for row in rows]
 
     def progress(self, minutes: float = 5.0) -> dict[str, Any]:
         """How the study goes: participants, those who finished, answered stimuli, pages answered a minute lately."""
