@@ -188,12 +188,12 @@ class Descriptors(TimedArrays, Content):
         xarray = needed("xarray", "xarray")
         axes = ("time", "base")
         variables = {
-            "weights": (axes, self.weights, {"long_name": "0 at rest, 1 fully active"}),
-            "residual": ("time", self.residual, {"units": "mm"}),
-            "head": (("time", "row", "column"), self.head, {"long_name": "pose of the head", "units": "mm"}),
+            "weights": (axes, self.weights.copy(), {"long_name": "0 at rest, 1 fully active"}),
+            "residual": ("time", np.array(self.residual), {"units": "mm"}),
+            "head": (("time", "row", "column"), np.array(self.head), {"long_name": "pose of the head", "units": "mm"}),
         }
         if self.deviation is not None:
-            variables["deviation"] = (axes, self.deviation, {"long_name": "standard deviation of the weights"})
+            variables["deviation"] = (axes, self.deviation.copy(), {"long_name": "standard deviation of the weights"})
         attributes = {"name": self.name, "rate": self.rate, "history": "\n".join(self.history)}
         if self.settings is not None:
             attributes["settings"] = str(self.settings)

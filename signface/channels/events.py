@@ -7,9 +7,11 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from signface.content import Content
+
 
 @dataclass(frozen=True, eq=False)
-class ChannelEvents:
+class ChannelEvents(Content):
     """What was found on one channel.
 
     Parameters

@@ -14,13 +14,14 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
+from signface.content import Content
 from signface.elan.vocabularies import AFFECT, INTENSITY, Vocabulary
 from signface.errors import SignfaceError
 from signface.segmentation.segments import Segments
 
 
-@dataclass(frozen=True)
-class Tier:
+@dataclass(frozen=True, eq=False)
+class Tier(Content):
     """A time-aligned tier of one channel of one signer.
 
     Parameters

@@ -24,6 +24,7 @@ import pandas as pd
 from lxml import etree
 
 from signface.channels.events import ChannelEvents
+from signface.content import Content
 from signface.elan.channels import channel_tiers
 from signface.elan.checking import check_document
 from signface.elan.curves import write_curves, write_tsconf
@@ -263,7 +264,7 @@ def to_pympi(annotation: Results | Segments, *, options: EafOptions | None = Non
 
 
 @dataclass(frozen=True, eq=False)
-class PreparedDocument:
+class PreparedDocument(Content):
     """A document that is complete and allowed to be written, and has not been yet.
 
     Parameters

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from signface.content import Content
 from signface.face.model import FaceModel
 
 
-@dataclass(frozen=True)
-class Camera:
+@dataclass(frozen=True, eq=False)
+class Camera(Content):
     """An orthographic camera.
 
     Parameters

@@ -15,6 +15,7 @@ from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from signface.content import Content
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.layout_files import nearest_points
@@ -29,8 +30,8 @@ RIGID_MM = 0.5
 OFF_SKIN_MM = 15.0
 
 
-@dataclass(frozen=True)
-class Suggestion:
+@dataclass(frozen=True, eq=False)
+class Suggestion(Content):
     """A proposed layout.
 
     Parameters

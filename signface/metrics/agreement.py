@@ -21,6 +21,7 @@ from itertools import combinations
 import numpy as np
 import pandas as pd
 
+from signface.content import Content
 from signface.errors import SignfaceError
 
 #: How the absence of an annotation is named.
@@ -134,8 +135,8 @@ def match_annotations(first: pd.DataFrame, second: pd.DataFrame, *, overlap: flo
     return sorted(pairs)
 
 
-@dataclass(frozen=True)
-class ModifiedKappa:
+@dataclass(frozen=True, eq=False)
+class ModifiedKappa(Content):
     """Result of `modified_kappa`.
 
     Parameters

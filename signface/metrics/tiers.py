@@ -10,12 +10,13 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from signface.content import Content
 from signface.errors import SignfaceError
 from signface.metrics.agreement import OVERLAP, agreement_table, confusion, frame_labels, modified_kappa
 
 
 @dataclass(frozen=True, eq=False)
-class TierAgreement:
+class TierAgreement(Content):
     """How far annotators agree on one tier.
 
     Parameters

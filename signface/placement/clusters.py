@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from signface.content import Content
 from signface.errors import SignfaceError
 from signface.placement.sites import Board, Sites
 
@@ -29,8 +30,8 @@ STARTS = 4
 MIDDLE_MM = 8.0
 
 
-@dataclass(frozen=True)
-class Clusters:
+@dataclass(frozen=True, eq=False)
+class Clusters(Content):
     """A choice of markers by clusters.
 
     Parameters

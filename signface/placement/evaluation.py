@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from signface.content import Content
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
@@ -42,8 +43,8 @@ STILL_MM = 0.1
 CONDITIONS = ("clean", "glued")
 
 
-@dataclass(frozen=True)
-class Errors:
+@dataclass(frozen=True, eq=False)
+class Errors(Content):
     """The errors of a layout under one mapping, from one actor to another.
 
     Parameters

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial import cKDTree
 
+from signface.content import Content
 from signface.errors import SignfaceError
 from signface.face.camera import face_camera
 from signface.face.model import FaceModel
@@ -38,8 +39,8 @@ _VIEW = (400, 480)
 GRAIN_MM = 2.5
 
 
-@dataclass(frozen=True)
-class Rules:
+@dataclass(frozen=True, eq=False)
+class Rules(Content):
     """What the captor allows.
 
     Parameters
@@ -70,8 +71,8 @@ class Rules:
             raise SignfaceError(f"the least distance between markers is 0 mm or more, not {self.apart_mm:g}")
 
 
-@dataclass(frozen=True)
-class Sites:
+@dataclass(frozen=True, eq=False)
+class Sites(Content):
     """Places for markers on a face.
 
     Parameters

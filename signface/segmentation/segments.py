@@ -63,6 +63,43 @@ class Segments(Content):
         """Whether the segments carry labels."""
         return "label" in self.table.columns
 
+    def to_frame(self) -> pd.DataFrame:
+        """The table, free to be changed."""
+        return self.table.copy()
+
+    def between(self, start_s: float, end_s: float) -> Segments:
+        """The segments that reach into a stretch of time, cut to it.
+
+        Parameters
+        ----------
+        start_s, end_s : float
+            Seconds; `-math.inf` and `math.inf` leave an end as it is.
+
+        Raises
+        ------
+        SignfaceError
+            No segment reaches into it.
+
+        See Also
+        --------
+        signface.Descriptors.between : the same frames.
+
+        Examples
+        --------
+        >>> table = pd.DataFrame({"start_s": [0.0, 1.0], "end_s": [1.0, 3.0], "kind": ["stable", "transition"]})
+        >>> Segments(table).between(0.5, 2.0).table
+           start_s  end_s        kind
+        0      0.5    1.0      stable
+        1      1.0    2.0  transition
+        """
+        cut = self.table.assign(
+            start_s=self.table["start_s"].clip(lower=start_s), end_s=self.table["end_s"].clip(upper=end_s)
+        )
+        cut = cut[cut["end_s"] - cut["start_s"] > 1e-9]
+        if cut.empty:
+            raise SignfaceError(f"{self.name}: no segment lies between {start_s:g} and {end_s:g} s")
+        return self.changed(f"between {start_s:g} and {end_s:g} s", cut)
+
     def changed(self, operation: str, table: pd.DataFrame) -> Segments:
         """A copy with another table and `operation` appended to the history."""
         return Segments(table, name=self.name, history=(*self.history, operation))

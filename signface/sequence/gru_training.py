@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from joblib import Parallel, cpu_count, delayed
 
+from signface.content import Content
 from signface.errors import SignfaceError
 
 if TYPE_CHECKING:
@@ -63,8 +64,8 @@ class NetworkSettings(Protocol):
     _frames: FrameFeatures
 
 
-@dataclass(frozen=True)
-class Lesson:
+@dataclass(frozen=True, eq=False)
+class Lesson(Content):
     """What is learnt from one take.
 
     Parameters

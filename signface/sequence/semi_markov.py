@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
+from signface.content import Content
 from signface.segmentation.segments import Segments
 
 #: Longest durations that are counted (s). A longer expression pays by the frame; a longer transition does not occur.
@@ -33,8 +34,8 @@ SETTLING_S = 0.32
 UNSEEN = 0.5
 
 
-@dataclass(frozen=True)
-class SegmentModel:
+@dataclass(frozen=True, eq=False)
+class SegmentModel(Content):
     """Durations and order of segments.
 
     Parameters

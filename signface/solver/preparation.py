@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from signface.content import Content
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
@@ -211,8 +212,8 @@ class Preparation:
         return (*self.recording.history, self._aligned_note, self._head.note)
 
 
-@dataclass(frozen=True)
-class PreparedTake:
+@dataclass(frozen=True, eq=False)
+class PreparedTake(Content):
     """A take brought to the avatar, ready to be solved.
 
     Parameters

@@ -17,6 +17,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from signface.content import Content
 from signface.errors import SignfaceError
 
 if TYPE_CHECKING:
@@ -71,8 +72,8 @@ _ORDER = (
 SPELT_OUT = 5
 
 
-@dataclass(frozen=True)
-class Responses:
+@dataclass(frozen=True, eq=False)
+class Responses(Content):
     """The answers of one study.
 
     Parameters

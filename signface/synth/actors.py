@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from signface.content import Content
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.face.reading import read_identities
@@ -29,8 +30,8 @@ from signface.synth.protocol import UTTERANCES, plan_utterance
 RATE = 30.0
 
 
-@dataclass(frozen=True)
-class Actor:
+@dataclass(frozen=True, eq=False)
+class Actor(Content):
     """An actor.
 
     Parameters
@@ -127,8 +128,8 @@ def signed_takes(names: tuple[str, ...], seconds: float, rng: np.random.Generato
     return np.concatenate(parts)[:frames]
 
 
-@dataclass(frozen=True)
-class Virtual:
+@dataclass(frozen=True, eq=False)
+class Virtual(Content):
     """The markers of a layout on an actor.
 
     Parameters

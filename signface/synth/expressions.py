@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from signface.content import Content
 from signface.errors import SignfaceError
 
 AFFECTS = ("A", "D", "F", "J", "Sa", "Su")
@@ -145,8 +146,8 @@ class Spread:
     amplitude: tuple[float, float, float] = (0.34, 0.60, 0.90)
 
 
-@dataclass(frozen=True)
-class Habits:
+@dataclass(frozen=True, eq=False)
+class Habits(Content):
     """What is a signer's own in showing affects and in moving.
 
     Parameters

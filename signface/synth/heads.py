@@ -19,6 +19,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial.transform import Rotation
 
+from signface.content import Content
 from signface.face.mesh import Mesh
 from signface.face.model import FaceModel
 
@@ -49,8 +50,8 @@ LEFT_OUT = (
 )
 
 
-@dataclass(frozen=True)
-class Head:
+@dataclass(frozen=True, eq=False)
+class Head(Content):
     """A signer's head.
 
     Parameters

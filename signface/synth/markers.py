@@ -18,6 +18,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial.transform import Rotation
 
+from signface.content import Content
 from signface.face.layout import MarkerLayout
 from signface.face.layout_files import nearest_points
 from signface.face.mesh import Mesh
@@ -38,8 +39,8 @@ SLIP_MM = 0.25
 DROPOUT_S = (0.020, 0.300)
 
 
-@dataclass(frozen=True)
-class Glued:
+@dataclass(frozen=True, eq=False)
+class Glued(Content):
     """Markers on a head.
 
     Parameters

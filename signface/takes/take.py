@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from signface.content import Content
 from signface.errors import SignfaceError
+from signface.extras import needed
 from signface.frames import TimedArrays
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +94,47 @@ class Take(TimedArrays, Content):
         if missing:
             raise SignfaceError(f"{self.name}: no marker named {', '.join(missing[:5])}")
         return self.positions[:, [index[label] for label in labels]]
+
+    def to_frame(self) -> pd.DataFrame:
+        """A table with a row for each frame, `time_s` its index, and `LABEL_x, LABEL_y, LABEL_z` of each marker (mm).
+
+        Written as csv it is a recording that `signface.read_take` reads.
+
+        See Also
+        --------
+        to_xarray : with labelled axes and the history.
+
+        Examples
+        --------
+        >>> take = Take(np.arange(6.0).reshape(2, 1, 3), ("CHIN",), rate=100)
+        >>> take.to_frame()
+                CHIN_x  CHIN_y  CHIN_z
+        time_s
+        0.00       0.0     1.0     2.0
+        0.01       3.0     4.0     5.0
+        """
+        import pandas as pd
+
+        columns = [f"{label}_{axis}" for label in self.labels for axis in "xyz"]
+        return pd.DataFrame(
+            self.positions.reshape(self.n_frames, -1), pd.Index(self.time, name="time_s"), columns, copy=True
+        )
+
+    def to_xarray(self) -> xarray.DataArray:
+        """The positions over `time` (s), `marker` and `axis` (`x`, `y`, `z`), in millimetres.
+
+        The attributes are `units`, `rate` (Hz) and `history` (a line for each step).
+
+        Raises
+        ------
+        SignfaceError
+            xarray is not installed.
+        """
+        xarray = needed("xarray", "xarray")
+        coordinates = {"time": ("time", self.time, {"units": "s"}), "marker": list(self.labels), "axis": list("xyz")}
+        attributes = {"units": "mm", "rate": self.rate, "history": "\n".join(self.history)}
+        axes = ("time", "marker", "axis")
+        return xarray.DataArray(self.positions.copy(), coordinates, axes, name=self.name, attrs=attributes)
 
     def changed(self, operation: str, **fields: object) -> Take:
         """A copy with some fields replaced and `operation` appended to its history."""

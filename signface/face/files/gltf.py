@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from signface.content import Content
 from signface.errors import SignfaceError
 from signface.face.model import FaceModel
 from signface.files import whole_file
@@ -27,8 +28,8 @@ _FLOAT, _UINT32, _UINT16 = 5126, 5125, 5123
 _ARRAY_BUFFER, _ELEMENT_ARRAY_BUFFER = 34962, 34963
 
 
-@dataclass(frozen=True)
-class RawFace:
+@dataclass(frozen=True, eq=False)
+class RawFace(Content):
     """What a file of shapes holds, before its unit is known.
 
     Parameters

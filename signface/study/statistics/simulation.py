@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from signface.content import Content
 from signface.errors import SignfaceError
 from signface.study.responses import PERSONAL, QUESTIONS, REQUIRED, SCALES
 
@@ -46,8 +47,8 @@ _RECOGNISED = {"A": 0.3, "D": 0.2, "F": -0.9, "J": 2.6, "Sa": 0.0, "Su": 1.6}
 _CONFUSED = {"A": {"D": 6}, "D": {"A": 6}, "F": {"Su": 8}, "Sa": {"F": 3, "Su": 3}, "Su": {"F": 3}}
 
 
-@dataclass(frozen=True)
-class Design:
+@dataclass(frozen=True, eq=False)
+class Design(Content):
     """What participants are shown and asked.
 
     Parameters

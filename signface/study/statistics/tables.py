@@ -11,6 +11,8 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from signface.content import Content
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -18,8 +20,8 @@ if TYPE_CHECKING:
 DECIMALS = {"statistic": 3, "effect": 3, "proportion": 3, "mean": 3, "count": 0}
 
 
-@dataclass(frozen=True)
-class StudyTable:
+@dataclass(frozen=True, eq=False)
+class StudyTable(Content):
     """One table of results.
 
     Parameters
