@@ -120,7 +120,7 @@ def run(arguments: argparse.Namespace) -> None:
 def print_results(metrics: dict) -> None:
     """Print accuracies beside chance and the majority class, and how the segments agree."""
     from signface.report.evaluation.tables import PROTOCOL_TITLES, SECTIONS, by_protocol
-    from signface.report.page_tables import spelt as number
+    from signface.report.pages import spelt as number
 
     for protocol, part in by_protocol(metrics).items():
         classifiers = part["classifiers"]

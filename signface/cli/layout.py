@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from signface.cli import layout_study
+from signface.cli import layout_comparison
 from signface.errors import SignfaceError
 
 EXAMPLE = (
     "  signface layout show --layout default-40 -o layout.png\n"
     "  signface layout check --layout mine.csv\n"
-    "  signface layout suggest take.c3d -o layout.csv --neutral 2.5\n" + layout_study.EXAMPLE
+    "  signface layout suggest take.c3d -o layout.csv --neutral 2.5\n" + layout_comparison.EXAMPLE
 )
 
 
@@ -38,13 +38,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     suggest.add_argument(
         "-o", "--output", type=Path, default=Path("layout.csv"), help="the layout (default: %(default)s)"
     )
-    layout_study.add_actions(actions)
+    layout_comparison.add_actions(actions)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Do what was asked; 0 when done."""
     own = {"show": _show, "check": _check, "suggest": _suggest}
-    own.get(arguments.action, layout_study.run_action)(arguments)
+    own.get(arguments.action, layout_comparison.run_action)(arguments)
     return 0
 
 

@@ -12,5 +12,5 @@ What it is compared on:
 
 - `actors`: heads of people who do not exist, their range of motion and their takes.
 - `evaluation`: the error of a layout, mapping by mapping.
-- `layout_study`: all of it, cell by cell, so that it can be resumed.
+- `comparison`: all of it, cell by cell, so that it can be resumed.
 """

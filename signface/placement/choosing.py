@@ -164,6 +164,11 @@ def named_layout(vertices: Sequence[int], face: FaceModel, name: str) -> MarkerL
     return with_head_markers(MarkerLayout.on_vertices(labels, name=name), face)
 
 
+def unseen_words(unseen: Sequence[str]) -> str:
+    """What bases that no range of motion shows mean for a layout."""
+    return f"the range of motion never shows {', '.join(unseen)}: layouts chosen from it may not see them"
+
+
 def unseen_bases(face: FaceModel, actors: Sequence[Actor]) -> tuple[list[str], list[str]]:
     """Bases that no range of motion shows, and bases that move no skin at all.
 

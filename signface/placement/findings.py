@@ -1,4 +1,4 @@
-"""What a layout study found, from its table of errors.
+"""What a comparison of layouts found, from its table of errors.
 
 - `flattening`: from how many markers on the error hardly falls.
 - `against`: one layout beside another on the same actors, mappings and draws.

@@ -9,10 +9,10 @@ import pytest
 from signface.cli.main import main
 from signface.errors import SignfaceError
 from signface.face.layout_files import read_layout
+from signface.placement.comparison import ComparisonPlan, load_cell, save_cell
 from signface.placement.empirical import place_layout
 from signface.placement.evaluation import error_map, evaluate_layout, skin_metric
 from signface.placement.findings import against, flattening
-from signface.placement.layout_study import Plan, load_cell, save_cell
 from signface.render.layout_sheet import distances, numbering
 from signface.solver.rivals.gaussian_process import GaussianProcess, SparseOnlineGaussianProcess
 from signface.synth.actors import Virtual, draw_actors
@@ -120,7 +120,7 @@ def test_a_cell_is_read_back_as_it_was_kept_and_a_damaged_one_is_done_again(face
 
 def test_a_study_needs_somebody_to_test_on():
     with pytest.raises(SignfaceError, match="test on"):
-        Plan(actors=2, selection=2)
+        ComparisonPlan(actors=2, selection=2)
 
 
 def _errors(layout, family, markers, values):

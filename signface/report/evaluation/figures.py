@@ -17,7 +17,7 @@ import pandas as pd
 
 from signface.descriptors import Descriptors
 from signface.report.evaluation.tables import PROTOCOL_TITLES, SECTIONS
-from signface.report.figure_files import COLOURS, MARKS, styled
+from signface.report.style import COLOURS, MARKS, styled
 from signface.report.timeline import draw_rows_on
 from signface.segmentation.segments import Segments
 

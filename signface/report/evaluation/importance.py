@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from signface.face.model import FaceModel
-from signface.report.figure_files import styled
+from signface.report.style import styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

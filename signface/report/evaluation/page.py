@@ -15,7 +15,7 @@ from signface.label.vocabulary import AFFECTS
 from signface.report.evaluation import sections, words
 from signface.report.evaluation.evaluated import Drawn, Evaluated, figure_name, takes_table
 from signface.report.evaluation.worst_takes import FAR_S, TakeVerdict
-from signface.report.page_tables import page_table
+from signface.report.pages import page_table, render_page
 
 #: Digits of a SHA-256 that are shown; the whole of it stands in metrics.json and recordings.csv.
 DIGITS = 12
@@ -30,8 +30,6 @@ def evaluation_page(evaluated: Evaluated, drawn: Mapping[str, Sequence[Drawn]]) 
     drawn : mapping
         Of `signface.report.evaluation.report.draw_all`.
     """
-    from signface.report.templates import environment
-
     metrics, facts = evaluated.metrics, evaluated.facts
     shown = [
         _section("accuracy", "Labels", sections.labels(evaluated), drawn["accuracy"]),
@@ -46,40 +44,37 @@ def evaluation_page(evaluated: Evaluated, drawn: Mapping[str, Sequence[Drawn]]) 
         _section("importance", "Which bases matter", sections.importance(evaluated), drawn["importance"]),
     ]
     figures = {figure.name: figure for kind in ("worst", "gallery") for figure in drawn[kind]}
-    return (
-        environment()
-        .get_template("evaluation.html.j2")
-        .render(
-            title=f"Evaluation on {facts['name']}",
-            synthetic=facts["synthetic"],
-            date=evaluated.date,
-            headline=words.headline(metrics, facts),
-            limits=words.limits(metrics, facts),
-            done=[
-                *(words.protocol_words(part["protocol"]) for part in evaluated.parts.values()),
-                words.training_words(metrics["protocol"].get("training", {})),
-            ],
-            classifiers=words.classifier_words(metrics["classifiers"]),
-            facts=_facts(evaluated),
-            labels=AFFECTS,
-            sections=shown,
-            best=evaluated.best,
-            far=f"{FAR_S:.2f}",
-            worst=[_take(verdict, figures) for verdict in evaluated.worst],
-            gallery=[_take(verdict, figures) for verdict in evaluated.gallery],
-            takes=page_table(
-                _plain_takes(evaluated.verdicts),
-                "takes",
-                "All takes, the worst first",
-                decimals={"agreement": 2},
-                folded=True,
-            ),
-            provenance=_provenance(evaluated),
-            recordings=_recordings(facts),
-            reading=words.READING,
-            versions=facts["versions"],
-            seed=metrics["protocol"]["seed"],
-        )
+    return render_page(
+        "evaluation.html.j2",
+        title=f"Evaluation on {facts['name']}",
+        synthetic=facts["synthetic"],
+        date=evaluated.date,
+        headline=words.headline(metrics, facts),
+        limits=words.limits(metrics, facts),
+        done=[
+            *(words.protocol_words(part["protocol"]) for part in evaluated.parts.values()),
+            words.training_words(metrics["protocol"].get("training", {})),
+        ],
+        classifiers=words.classifier_words(metrics["classifiers"]),
+        facts=_facts(evaluated),
+        labels=AFFECTS,
+        sections=shown,
+        best=evaluated.best,
+        far=f"{FAR_S:.2f}",
+        worst=[_take(verdict, figures) for verdict in evaluated.worst],
+        gallery=[_take(verdict, figures) for verdict in evaluated.gallery],
+        takes=page_table(
+            _plain_takes(evaluated.verdicts),
+            "takes",
+            "All takes, the worst first",
+            decimals={"agreement": 2},
+            folded=True,
+        ),
+        provenance=_provenance(evaluated),
+        recordings=_recordings(facts),
+        reading=words.READING,
+        versions=facts["versions"],
+        seed=metrics["protocol"]["seed"],
     )
 
 

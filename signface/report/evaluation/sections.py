@@ -17,7 +17,7 @@ from signface.label.labellers import SEQUENCE_NAMES
 from signface.label.vocabulary import AFFECTS
 from signface.report.evaluation import tables, words
 from signface.report.evaluation.evaluated import Evaluated
-from signface.report.page_tables import page_table, spelt
+from signface.report.pages import page_table, spelt
 
 #: Paragraphs and tables of a section.
 Content = tuple[list[str], list[dict[str, Any]]]

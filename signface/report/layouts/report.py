@@ -1,202 +1,202 @@
-"""The report of a layout study: one HTML page with its figures, tables and the recommended layout beside it.
+"""The report of a comparison of layouts: a folder with its page, its tables and the recommended layout.
 
-- `draw_curves`: error against the number of markers (figures 3.5, 3.7 and 3.8 of the thesis).
-- `paint_errors`: errors painted on the face (figure 3.4).
-- `paint_clusters`: clusters and their markers (figure 3.6).
-- `layout_page`: the page.
+- `write_report`: the folder.
+- `comparison_page`: the page alone.
 """
 
 from __future__ import annotations
 
-import base64
-import html
-import io
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
-from signface.face.camera import face_camera
-from signface.face.model import FaceModel
-from signface.render.still import render
+from signface.face.layout_files import write_layout
+from signface.files import whole_file
+from signface.placement.choosing import METHODS, Material, unseen_words
+from signface.placement.comparison import Comparison, ComparisonPlan, summarise
+from signface.placement.empirical import EMPIRICAL
+from signface.placement.evaluation import MAPPINGS, error_map
+from signface.placement.findings import against, flattening, mean_moment, same_size
+from signface.render.layout_sheet import distances, draw_sheet
+from signface.report.figure_files import png_element, svg_element
+from signface.report.layouts.figures import draw_curves, paint_clusters, paint_errors
+from signface.report.pages import page_table, render_page
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Family: name in the report, colour (Okabe and Ito), marker, line.
-FAMILIES = {
-    "man": ("manual (MAN)", "#000000", "s", "--"),
-    "star": ("published (STAR)", "#999999", "D", ""),
-    "default": ("default", "#e41a1c", "*", ""),
-    "k-means": ("k-means", "#0072b2", "o", "-"),
-    "k-means, one actor": ("k-means, one actor", "#56b4e9", "o", ":"),
-    "greedy": ("greedy reconstruction", "#d55e00", "^", "-"),
-    "a-optimal": ("A-optimal design", "#009e73", "v", "-"),
-    "d-optimal": ("D-optimal design", "#cc79a7", "P", "-"),
-    "thin-shell": ("thin-shell selection", "#e69f00", "X", "-"),
-}
-CONDITIONS = {"clean": "clean markers", "glued": "glued 1 to 3 mm aside, with jitter"}
-
-STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 66rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
-table { border-collapse: collapse; margin: 1rem 0; font-size: .92rem; }
-th, td { padding: .2rem .7rem; border-bottom: 1px solid #ddd; text-align: right; }
-th:first-child, td:first-child { text-align: left; }
-figure { margin: 1.5rem 0; } svg, img { max-width: 100%; height: auto; } figcaption, .note { color: #555; }
-li { margin: .3rem 0; }
-"""
+#: Clusters drawn, as in figure 3.6.
+CLUSTERS = 30
+#: What the recommended layout is held against.
+PRESENT = "default-40"
 
 
-def draw_curves(summary: pd.DataFrame, mappings: Mapping[str, str]) -> Figure:
-    """Error against the number of markers, a row for each condition, a column for each mapping."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11.0, 6.6), layout="constrained")
-    axes = figure.subplots(len(CONDITIONS), len(mappings), sharex=True, squeeze=False)
-    for row, (condition, title) in enumerate(CONDITIONS.items()):
-        for column, (mapping, name) in enumerate(mappings.items()):
-            own = axes[row, column]
-            part = summary[(summary["condition"] == condition) & (summary["mapping"] == mapping)]
-            for family, (label, colour, marker, line) in FAMILIES.items():
-                points = part[part["family"] == family].sort_values("markers")
-                if len(points):
-                    own.plot(points["markers"], points["rms_mm"], marker=marker, linestyle=line or "none", color=colour,
-                             label=label, markersize=9 if marker == "*" else 5, linewidth=1.3)  # fmt: skip
-            own.grid(color="#eeeeee")
-            own.set_axisbelow(True)
-            own.set_ylim(bottom=0)
-            if row == 0:
-                own.set_title(name, fontsize=11)
-            if column == 0:
-                own.set_ylabel(f"{title}\nerror of a vertex, mm (RMS)", fontsize=9)
-            if row == len(CONDITIONS) - 1:
-                own.set_xlabel("face markers", fontsize=9)
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=5, fontsize=8.5, frameon=False)
-    return figure
-
-
-def paint_errors(
-    face: FaceModel, maps: Mapping[str, np.ndarray], points: Mapping[str, np.ndarray], title: str
-) -> Figure:
-    """Faces coloured by the error of each vertex, one scale for all, with the markers of each layout.
+def write_report(comparison: Comparison, folder: str | PathLike[str]) -> Path:
+    """Write `report.html`, the tables as CSV, every layout, and the recommended one with its sheet.
 
     Parameters
     ----------
-    face : FaceModel
-    maps : mapping
-        Title of each picture to its (V,) errors in millimetres.
-    points : mapping
-        The same titles to the (P, 3) places of the markers.
-    title : str
-        Of the figure.
+    comparison : Comparison
+    folder : path
+        Created when missing.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    SignfaceError
+        The folder cannot be written.
+
+    See Also
+    --------
+    signface.placement.comparison.compare_layouts : makes the comparison.
     """
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-    from matplotlib.figure import Figure
-
-    size = (260, 320)
-    largest = max(float(np.quantile(own, 0.995)) for own in maps.values())
-    scale, colours = Normalize(0.0, largest), colormaps["viridis"]
-    figure = Figure(figsize=(2.4 * len(maps) + 0.8, 3.4), dpi=100, layout="constrained")
-    axes = figure.subplots(1, len(maps), squeeze=False)[0]
-    camera = face_camera(face, size=size, margin=1.1)
-    for own, (name, errors) in zip(axes, maps.items()):
-        _show(own, face, camera, colours(scale(errors))[:, :3], points[name], size)
-        own.set_title(name, fontsize=9)
-    figure.colorbar(ScalarMappable(scale, colours), ax=list(axes), shrink=0.8, label="error, mm (RMS)")
-    figure.suptitle(title, fontsize=10)
-    return figure
-
-
-def paint_clusters(
-    face: FaceModel, clustered: np.ndarray, members: Mapping[str, np.ndarray], points: Mapping[str, np.ndarray]
-) -> Figure:
-    """Faces coloured by cluster, neighbours apart in hue, with the markers.
-
-    Parameters
-    ----------
-    face : FaceModel
-    clustered : (K,) int array
-        The vertices that are clustered.
-    members : mapping
-        Title to the (K,) clusters.
-    points : mapping
-        Title to the (P, 3) places of the markers.
-    """
-    from matplotlib.colors import hsv_to_rgb
-    from matplotlib.figure import Figure
-
-    size = (330, 400)
-    figure = Figure(figsize=(3.3 * len(members), 4.1), dpi=100, layout="constrained")
-    axes = figure.subplots(1, len(members), squeeze=False)[0]
-    camera = face_camera(face, size=size, margin=1.1)
-    for own, (name, cluster) in zip(axes, members.items()):
-        hue = (cluster * 0.61803398875) % 1.0  # the golden section keeps successive hues apart
-        colours = np.full((len(face.mesh.vertices), 3), 0.8)
-        colours[clustered] = hsv_to_rgb(np.stack([hue, np.full(len(hue), 0.55), np.full(len(hue), 0.95)], axis=1))
-        _show(own, face, camera, colours, points[name], size)
-        own.set_title(name, fontsize=10)
-    return figure
+    folder, face, layout = Path(folder), comparison.face, comparison.recommended
+    table = comparison.table
+    tables = {"errors": table, "summary": summarise(table), "choice_of_method": comparison.rivals}
+    for name, frame in tables.items():
+        with whole_file(folder / f"{name}.csv") as temporary:
+            frame.to_csv(temporary, index=False, float_format="%.5f")
+    for candidate in comparison.candidates:
+        write_layout(candidate.layout, folder / "layouts" / f"{candidate.layout.name}.csv", face)
+    write_layout(layout, folder / f"{layout.name}.csv", face)
+    with whole_file(folder / f"{layout.name}-distances.csv") as temporary:
+        distances(layout, face).to_csv(temporary, index=False)
+    sheets = [folder / f"{layout.name}-sheet.{ending}" for ending in ("pdf", "svg", "png")]
+    draw_sheet(face, layout, *sheets, note=f"Chosen by: {METHODS[comparison.method]}.")
+    with whole_file(folder / "report.html") as temporary:
+        temporary.write_text(comparison_page(comparison), encoding="utf-8")
+    return folder / "report.html"
 
 
-def _show(axes, face, camera, colours, points, size) -> None:  # type: ignore[no-untyped-def]
-    axes.imshow(render(face.mesh, camera, colours), interpolation="antialiased")
-    pixels = camera.project(points)
-    axes.plot(pixels[:, 0], pixels[:, 1], "o", color="white", markersize=2.8, markeredgecolor="black", mew=0.5)
-    axes.set(xlim=(0, size[0]), ylim=(size[1], 0))
-    axes.axis("off")
+def comparison_page(comparison: Comparison) -> str:
+    """The page: one file, no script, no request to anyone."""
+    from signface.extras import version_of
 
-
-def layout_page(
-    *,
-    title: str,
-    findings: Sequence[str],
-    method: Sequence[str],
-    figures: Sequence[tuple[Figure, str, str]],
-    tables: Sequence[tuple[str, pd.DataFrame]],
-    warnings: Sequence[str] = (),
-) -> str:
-    """The page: one file that needs nothing else.
-
-    Parameters
-    ----------
-    title : str
-    findings, method, warnings : sequence of str
-        Sentences.
-    figures : sequence of (Figure, str, str)
-        Each with its caption and how it is embedded: `svg`, or `png` for painted faces.
-    tables : sequence of (str, DataFrame)
-        Each with its caption.
-    """
-    parts = [f"<h1>{html.escape(title)}</h1>"]
-    parts += [f"<p class='note'><strong>{html.escape(word)}</strong></p>" for word in warnings]
-    parts.append("<h2>Findings</h2><ul>" + "".join(f"<li>{html.escape(word)}</li>" for word in findings) + "</ul>")
-    for figure, caption, kind in figures:
-        parts.append(f"<figure>{embedded(figure, kind)}<figcaption>{html.escape(caption)}</figcaption></figure>")
-    parts.append("<h2>How it was measured</h2>" + "".join(f"<p>{html.escape(word)}</p>" for word in method))
-    for caption, table in tables:
-        body = table.to_html(index=False, border=0, float_format=lambda value: f"{value:.3f}", escape=True)
-        parts.append(f"<details><summary>{html.escape(caption)}</summary>{body}</details>")
-    body = "\n".join(parts)
-    return (
-        f"<!doctype html><html lang='en'><head><meta charset='utf-8'><title>{html.escape(title)}</title>"
-        f"<style>{STYLE}</style></head><body>{body}</body></html>\n"
+    plan, table, name = comparison.plan, comparison.table, comparison.recommended.name
+    summary = summarise(table)
+    curves = draw_curves(summary[summary["family"] != "recommended"], MAPPINGS)
+    description = "Lines: error of each family of layouts against the number of markers; the tables have the numbers."
+    shown = [
+        ("summary", "Mean error of every layout, mm per vertex", summary),
+        ("flattening", "Where the curves flatten", flattening(table)),
+        ("same-size", "Optimised layouts beside empirical ones of their size", same_size(table)),
+        ("recommended", f"{name} beside {PRESENT}", against(table, name, PRESENT)),
+    ]
+    return render_page(
+        "layouts.html.j2",
+        title="Which markers, how many, where",
+        warnings=[unseen_words(comparison.unseen)] if comparison.unseen else [],
+        findings=_findings(table, name, comparison.method),
+        figures=[
+            {
+                "svg": svg_element(curves, "curves", description),
+                "caption": "Error against the number of markers on held-out actors (figures 3.5, 3.7 and 3.8 of the "
+                "thesis).",
+            },
+            *_painted(comparison),
+        ],
+        tables=[page_table(frame, key, caption, decimals=3, folded=True) for key, caption, frame in shown],
+        method=_method(plan),
+        version=version_of("signface"),
+        seed=plan.seed,
     )
 
 
-def embedded(figure: Figure, kind: str) -> str:
-    """A figure as inline SVG, or as an image element with its PNG in it."""
-    from matplotlib import rc_context
+def _painted(comparison: Comparison) -> list[dict[str, str]]:
+    """The pictures of the face: errors of some layouts, and clusters."""
+    plan, face = comparison.plan, comparison.face
+    layouts = {candidate.layout.name: candidate.layout for candidate in comparison.candidates}
+    names = [name for name in ("man-15", "sign3d-60", PRESENT, comparison.recommended.name) if name in layouts]
+    points = {name: layouts[name].points(face) for name in names}
+    figures = []
+    for mapping in ("thin-shell", "gp"):
+        maps = {name: error_map(face, mean_moment(comparison.cells, name, "glued", mapping)) for name in names}
+        title = f"{MAPPINGS[mapping]}, markers as they are really glued"
+        description = f"Faces painted with the error of {', '.join(names)}: {title}"
+        figures.append(
+            {
+                "svg": png_element(paint_errors(face, maps, points, title), description),
+                "caption": "Where the error lies (figure 3.4 of the thesis).",
+            }
+        )
+    if "k-means" in plan.methods:
+        figures.append(
+            {
+                "svg": png_element(_clusters(comparison), "Faces painted with clusters of k-means, and their markers"),
+                "caption": "Clusters of k-means and their markers (figure 3.6).",
+            }
+        )
+    return figures
 
-    if kind == "svg":
-        text = io.StringIO()
-        with rc_context({"svg.hashsalt": "signface"}):
-            figure.savefig(text, format="svg", metadata={"Date": None})
-        content = text.getvalue()
-        return content[content.index("<svg") :]
-    data = io.BytesIO()
-    figure.savefig(data, format="png")
-    return f"<img alt='' src='data:image/png;base64,{base64.b64encode(data.getvalue()).decode()}'>"
+
+def _clusters(comparison: Comparison) -> Figure:
+    plan, face, material = comparison.plan, comparison.face, comparison.material
+    materials = {"one actor": Material(face, material.actors[:1], material.rules)}
+    if plan.selection > 1:
+        materials[f"{plan.selection} actors"] = material
+    count = min(CLUSTERS, max(plan.sizes))
+    clusters: dict[str, Any] = {
+        f"{count} clusters, {name}": part.clusters(count, seed=plan.seed) for name, part in materials.items()
+    }
+    return paint_clusters(
+        face,
+        material.sites.clustered,
+        {title: part.members for title, part in clusters.items()},
+        {title: face.mesh.vertices[list(part.markers)] for title, part in clusters.items()},
+    )
+
+
+def _findings(table: pd.DataFrame, recommended: str, method: str) -> list[str]:
+    """Sentences with the numbers of this comparison."""
+    words = []
+    flat = flattening(table)
+    for (condition, mapping), curves in flat.groupby(["condition", "mapping"], sort=False):
+        least = curves.loc[curves["least_mm"].idxmin()]
+        spans = ", ".join(f"{row.family} {row.enough}" for row in curves.itertuples(index=False))
+        words.append(
+            f"{MAPPINGS[str(mapping)]}, {condition} markers: markers from which the error is within 5 % of the curve's "
+            f"least: {spans}. Least of all: {least['least_mm']:.2f} mm ({least['family']}, {least['at']} markers)."
+        )
+    pairs = same_size(table)
+    if len(pairs):
+        for family, rows in pairs.groupby(pairs["layout"].str.replace(r"-\d+$", "", regex=True), sort=False):
+            if family == "recommended":
+                continue
+            words.append(
+                f"{family}: less error than empirical layouts of its size in {np.mean(rows['change'] > 0):.0%} of "
+                f"{len(rows)} comparisons (layout, condition, mapping); {rows['change'].mean():+.0%} less on average."
+            )
+    rivals = against(table, recommended, PRESENT)
+    for row in rivals.itertuples(index=False):
+        words.append(
+            f"{recommended} ({METHODS[method]}) beside {PRESENT}, {MAPPINGS[str(row.mapping)]}, {row.condition}: "
+            f"{row.one_mm:.3f} against {row.other_mm:.3f} mm ({row.change:+.0%} less), better in {row.better:.0%} of "
+            f"{row.pairs} pairs of actors and draws."
+        )
+    return words
+
+
+def _method(plan: ComparisonPlan) -> list[str]:
+    return [
+        f"{plan.actors} synthetic actors, each with a head and skin of their own, a range of motion and signed takes "
+        f"of {plan.seconds:g} s at 30 frames a second. Markers are chosen on the range of motion of the first "
+        f"{plan.selection}; errors are taken on the takes of the others, which no choice has seen. The learnt mappings "
+        "are trained on one actor's range of motion and tested on another actor's takes.",
+        "Error: root mean square distance of a vertex that moves from its place on the avatar, in millimetres; eq. 3.5 "
+        "of the thesis sums over the vertices instead, which multiplies it by the square root of their number (column "
+        "rmse_mm of errors.csv).",
+        "Glued: every actor wears every marker 1 to 3 mm beside its place, with 0.1 to 0.3 mm of jitter, in training "
+        f"and in tests; {plan.draws} draws.",
+        "The method of the recommended layout is the one with the least error on the selection actors, each left out "
+        "in turn (choice_of_method.csv).",
+        "Empirical layouts: " + "; ".join(f"{name}: {what}" for name, what in EMPIRICAL.items()) + ".",
+        "These are synthetic faces with the avatar's 51 bases beneath: what a base does not show (a wrinkle) no layout "
+        "is rewarded for seeing.",
+    ]

@@ -7,13 +7,13 @@
 
 from __future__ import annotations
 
-import io
-import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from signface.report.figure_files import svg_element
+from signface.report.style import COLOURS, MARKS, styled
 from signface.study.responses import LIKERT, Responses
 from signface.study.statistics.intervals import participant_interval
 from signface.study.statistics.tables import StudyTable
@@ -23,25 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Okabe and Ito's colours without yellow, told apart by colour-blind readers, and marks that differ in print.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#444444")
-MARKS = ("o", "s", "D", "^", "v", "P", "X")
-
 #: Letters of a method's name that figures have room for.
 LONGEST_NAME = 18
-
-_STYLE: dict[Any, Any] = {
-    "font.size": 10,
-    "font.family": "DejaVu Sans",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": "#888888",
-    "axes.titlesize": 11,
-    "axes.titleweight": "bold",
-    "svg.hashsalt": "signface",  # the same figure gives the same bytes
-    "svg.fonttype": "path",
-    "text.parse_math": False,  # a method's name may hold a dollar
-}
 
 
 def means_figure(responses: Responses, *, resamples: int, seed: int) -> str:
@@ -59,7 +42,7 @@ def means_figure(responses: Responses, *, resamples: int, seed: int) -> str:
         An `<svg>` element.
     """
     questions, methods = responses.questions, responses.methods
-    with _style():
+    with styled():
         figure = _figure(2.3 * len(questions) + 0.4, 2.9)
         for place, (column, name) in enumerate(questions.items(), start=1):
             axes = figure.add_subplot(1, len(questions), place)
@@ -88,11 +71,10 @@ def means_figure(responses: Responses, *, resamples: int, seed: int) -> str:
             axes.set_title(name)
             axes.set_xticks(range(len(methods)), map(_short, methods), rotation=30 if max(map(len, methods)) > 5 else 0)
             axes.set_xlim(-0.6, len(methods) - 0.2)
-            axes.yaxis.grid(True, color="#e6e6e6")
-            axes.set_axisbelow(True)
+            axes.yaxis.grid(True)
             axes.set_ylabel("share recognised" if column == "correct" else "mean answer, 1 to 7")
         _mark(figure, responses)
-        return _svg(figure, "Means of every question by method, with 95 % intervals over participants")
+        return svg_element(figure, "means", "Means of every question by method, with 95 % intervals over participants")
 
 
 def differences_figure(responses: Responses, contrasts: StudyTable, models: StudyTable, *, alpha: float = 0.05) -> str:
@@ -107,7 +89,7 @@ def differences_figure(responses: Responses, contrasts: StudyTable, models: Stud
         A difference that the mixed model shows at this level, for the question and then for the pair, is filled.
     """
     questions = responses.questions
-    with _style():
+    with styled():
         pairs = list(dict.fromkeys(contrasts.frame["", "pair"]))  # a question may not have been asked for every method
         longest = min(2 * LONGEST_NAME + 3, max(map(len, pairs)))
         figure = _figure(1.9 * len(questions) + 0.085 * longest + 1.2, 0.42 * len(pairs) + 1.1)
@@ -135,12 +117,11 @@ def differences_figure(responses: Responses, contrasts: StudyTable, models: Stud
             axes.set_title(name)
             axes.set_yticks(range(len(pairs)), [" – ".join(map(_short, pair.split(" – "))) for pair in pairs])
             axes.set_ylim(len(pairs) - 0.5, -0.5)
-            axes.xaxis.grid(True, color="#e6e6e6")
-            axes.set_axisbelow(True)
+            axes.xaxis.grid(True)
             axes.set_xlabel("shares" if name == questions.get("correct") else "points")
             axes.tick_params(axis="y", length=0)
         _mark(figure, responses)
-        return _svg(figure, "Differences between methods with 95 % intervals over participants")
+        return svg_element(figure, "differences", "Differences between methods with 95 % intervals over participants")
 
 
 def confusion_figure(responses: Responses) -> str:
@@ -148,7 +129,7 @@ def confusion_figure(responses: Responses) -> str:
     matrices = confusions(responses)
     if not matrices:
         return ""
-    with _style():
+    with styled():
         columns = min(3, len(matrices))
         lines = -(-len(matrices) // columns)
         first = next(iter(matrices.values()))
@@ -182,13 +163,13 @@ def confusion_figure(responses: Responses) -> str:
             axes.tick_params(length=0)
             axes.spines[:].set_visible(False)
         _mark(figure, responses)
-        return _svg(figure, "Confusion matrices by method, in per cent of the films of an expression")
+        return svg_element(figure, "confusion", "Confusion matrices by method, per cent of the films of an expression")
 
 
 def expressions_figure(responses: Responses) -> str:
     """Means of every question by played expression, one mark per method."""
     questions, methods, expressions = responses.questions, responses.methods, responses.expressions
-    with _style():
+    with styled():
         columns = 2 if len(questions) in (2, 4) else min(3, len(questions))
         lines = -(-len(questions) // columns)
         figure = _figure(9.6 if columns > 1 else 4.8, 2.5 * lines + 0.5)
@@ -212,13 +193,12 @@ def expressions_figure(responses: Responses) -> str:
             axes.set_ylim((0, 1.02) if column == "correct" else (LIKERT[0] - 0.1, LIKERT[1] + 0.1))
             if column != "correct":
                 axes.set_yticks(range(LIKERT[0], LIKERT[1] + 1, 2))
-            axes.yaxis.grid(True, color="#e6e6e6")
-            axes.set_axisbelow(True)
+            axes.yaxis.grid(True)
             axes.tick_params(axis="x", length=0)
         handles, labels = figure.axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(methods), frameon=False)
+        figure.legend(handles, labels, loc="outside lower center", ncols=len(methods))
         _mark(figure, responses)
-        return _svg(figure, "Means by played expression and method")
+        return svg_element(figure, "expressions", "Means by played expression and method")
 
 
 def _short(name: str) -> str:
@@ -235,12 +215,6 @@ def _rotation(labels: Sequence[str]) -> int:
     return 45 if max(len(str(label)) for label in labels) > 4 else 0
 
 
-def _style():  # type: ignore[no-untyped-def]  # a context manager of matplotlib's
-    import matplotlib
-
-    return matplotlib.rc_context(_STYLE)
-
-
 def _figure(width: float, height: float) -> Figure:
     from matplotlib.figure import Figure
 
@@ -255,12 +229,3 @@ def _mark(figure: Figure, responses: Responses) -> None:
         figure.text(
             0.5, 0.5, "SIMULATED", fontsize=44, color="#b00020", alpha=0.09, ha="center", va="center", rotation=18
         )
-
-
-def _svg(figure: Figure, description: str) -> str:
-    """The figure as one SVG element with a description for who cannot see it."""
-    buffer = io.StringIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": "signface"})
-    text = buffer.getvalue()
-    text = text[text.index("<svg") :]
-    return re.sub(r"<svg ", f'<svg role="img" aria-label="{description}" ', text, count=1)

@@ -16,6 +16,7 @@ from typing import Any
 from signface.errors import SignfaceError
 from signface.files import whole_file
 from signface.label.vocabulary import AFFECTS
+from signface.report.pages import render_page
 from signface.report.study.figures import confusion_figure, differences_figure, expressions_figure, means_figure
 from signface.study.statistics.analysis import Analysis, Section
 from signface.study.statistics.tables import StudyTable, as_latex
@@ -147,31 +148,27 @@ def report_html(
     import scipy
 
     from signface.extras import version_of
-    from signface.report.templates import environment
 
     responses = analysis.responses
     drawn = _figures(analysis) if figures is None else figures
-    return (
-        environment()
-        .get_template("study_report.html.j2")
-        .render(
-            title=title or "Perceptual study",
-            simulated=responses.simulated,
-            source=Path(responses.name).name,
-            facts=_facts(analysis),
-            warnings=[warning for warning in responses.warnings if "SIMULATED ANSWERS" not in warning],
-            findings=analysis.findings,
-            sections=[_section(section, drawn.get(section.key, []), analysis) for section in analysis.sections],
-            screenshots=_pictures(screenshots),
-            reading=READING,
-            alpha=f"{analysis.alpha:g}",
-            resamples=analysis.resamples,
-            seed=analysis.seed,
-            version=version_of("signface"),
-            numpy=numpy.__version__,
-            scipy=scipy.__version__,
-            statsmodels=version_of("statsmodels"),
-        )
+    return render_page(
+        "study.html.j2",
+        title=title or "Perceptual study",
+        simulated=responses.simulated,
+        source=Path(responses.name).name,
+        facts=_facts(analysis),
+        warnings=[warning for warning in responses.warnings if "SIMULATED ANSWERS" not in warning],
+        findings=analysis.findings,
+        sections=[_section(section, drawn.get(section.key, []), analysis) for section in analysis.sections],
+        screenshots=_pictures(screenshots),
+        reading=READING,
+        alpha=f"{analysis.alpha:g}",
+        resamples=analysis.resamples,
+        seed=analysis.seed,
+        version=version_of("signface"),
+        numpy=numpy.__version__,
+        scipy=scipy.__version__,
+        statsmodels=version_of("statsmodels"),
     )
 
 
@@ -219,18 +216,21 @@ def _table(table: StudyTable, alpha: float) -> dict[str, Any]:
             groups.append((name, 1))
     kinds = [table.kind(column) for column in table.frame.columns]
     rows = [
-        [(text, _class(value, kind, alpha)) for text, value, kind in zip(shown, row, kinds)]
-        for shown, row in zip(table.cells(), table.frame.itertuples(index=False))
+        {"cells": [(text, _class(value, kind, alpha)) for text, value, kind in zip(texts, row, kinds)], "strong": False}
+        for texts, row in zip(table.cells(), table.frame.itertuples(index=False))
     ]
     reference = table.reference
     if reference and not reference.startswith("figure"):
         reference = ("tables " if "," in reference else "table ") + reference
     return {
         "key": table.key,
-        "title": table.title,
-        "reference": reference,
+        "caption": table.title,
+        "reference": f"form of {reference} of the thesis" if reference else "",
         "groups": groups if any(above) else [],
-        "columns": [(name, "text" if kind == "text" else "") for name, kind in zip(below, kinds)],
+        "columns": [
+            (name, ("text" if kind == "text" else "") + (" broken" if len(name) > 14 else ""))
+            for name, kind in zip(below, kinds)
+        ],
         "rows": rows,
         "notes": table.notes,
         "folded": table.key in FOLDED or table.key.startswith("confusion_"),
@@ -240,7 +240,7 @@ def _table(table: StudyTable, alpha: float) -> dict[str, Any]:
 def _class(value: object, kind: str, alpha: float) -> str:
     if kind == "p" and isinstance(value, float) and not math.isnan(value) and value < alpha:
         return "low"
-    return "" if kind != "text" else "long" if isinstance(value, str) and len(value) > LONG else "text"
+    return "" if kind != "text" else "text long" if isinstance(value, str) and len(value) > LONG else "text"
 
 
 def _figures(analysis: Analysis) -> dict[str, list[dict[str, str]]]:

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from signface.cli.progress import progress
 from signface.errors import SignfaceError
 
 if TYPE_CHECKING:
     from signface.face.model import FaceModel
-    from signface.placement.layout_study import Cell, Entry, Plan
+    from signface.placement.evaluation import Errors
     from signface.placement.sites import Rules
-    from signface.synth.actors import Actor
 
 EXAMPLE = (
     "  signface layout place signcom-41 -o signcom.csv\n"
@@ -56,24 +57,26 @@ def add_actions(actions: argparse._SubParsersAction) -> None:
     study.add_argument("--draws", type=int, default=2, metavar="N", help="draws of placement errors (default: 2)")
     study.add_argument("--recommended", type=int, default=40, metavar="N", help="size of the recommended layout")
     study.add_argument("--jobs", type=int, default=0, metavar="N", help="processes (default: one for each core)")
-    for own in (optimise, study):
-        own.add_argument("--seconds", type=float, default=90.0, help="of each motion of an actor (default: 90)")
-        own.add_argument("--seed", type=int, default=0, help="(default: %(default)s)")
-        own.add_argument("--asymmetric", action="store_true", help="do not pair markers left and right")
-        own.add_argument(
+    for command in (optimise, study):
+        command.add_argument("--seconds", type=float, default=90.0, help="of each motion of an actor (default: 90)")
+        command.add_argument("--seed", type=int, default=0, help="(default: %(default)s)")
+        command.add_argument("--asymmetric", action="store_true", help="do not pair markers left and right")
+        command.add_argument(
             "--forbid",
             action="append",
             metavar="ZONE|CSV",
             help="where no marker may stand: lids, lips-inner, nostrils, under-jaw, none, or a csv of x,y,z,radius_mm;"
             " may be repeated (default: the four zones)",
         )
-        own.add_argument("--apart", type=float, default=8.0, metavar="MM", help="least distance (default: 8)")
-        own.add_argument("--keep", type=Path, metavar="LAYOUT.csv", help="markers that stay, on the nearest vertices")
+        command.add_argument("--apart", type=float, default=8.0, metavar="MM", help="least distance (default: 8)")
+        command.add_argument(
+            "--keep", type=Path, metavar="LAYOUT.csv", help="markers that stay, at the nearest vertices"
+        )
 
 
 def run_action(arguments: argparse.Namespace) -> None:
     """Do the action that was asked for."""
-    {"place": _place, "optimise": _optimise, "study": _study}[arguments.action](arguments)
+    {"place": _place, "optimise": _optimise, "study": _compare}[arguments.action](arguments)
 
 
 def _place(arguments: argparse.Namespace) -> None:
@@ -118,28 +121,19 @@ def _rules(arguments: argparse.Namespace, face: FaceModel) -> Rules:
     return Rules(not arguments.asymmetric, tuple(zones), tuple(spheres), arguments.apart, fixed)
 
 
-def _warn(face: FaceModel, actors: list[Actor]) -> list[str]:
-    """Say which expressions the layouts will not see."""
-    from signface.placement.choosing import unseen_bases
-
-    never, _ = unseen_bases(face, actors)
-    words = f"the range of motion never shows {', '.join(never)}: layouts chosen from it may not see them"
-    if never:
-        print(f"warning: {words}", file=sys.stderr)
-    return [words] if never else []
-
-
 def _optimise(arguments: argparse.Namespace) -> None:
     from signface.face.layout_files import write_layout
     from signface.face.reading import read_face
-    from signface.placement.choosing import METHODS, Material, choose
+    from signface.placement.choosing import METHODS, Material, choose, unseen_bases, unseen_words
     from signface.render.layout_sheet import draw_sheet
     from signface.synth.actors import draw_actors
 
     face = read_face("default")
     rules = _rules(arguments, face)
     actors = draw_actors(face, arguments.actors, seconds=arguments.seconds, seed=arguments.seed)
-    _warn(face, actors)
+    unseen, _ = unseen_bases(face, actors)
+    if unseen:
+        print(f"warning: {unseen_words(unseen)}", file=sys.stderr)
     layout = choose(Material(face, actors, rules), arguments.method, arguments.markers, seed=arguments.seed)
     sheet = arguments.output.with_name(f"{arguments.output.stem}-sheet.pdf")
     layout = replace(layout, name=arguments.output.stem)
@@ -149,88 +143,38 @@ def _optimise(arguments: argparse.Namespace) -> None:
     print(f"{sheet}: for the person who glues them")
 
 
-def _study(arguments: argparse.Namespace) -> None:
-    from signface.face.layout_files import write_layout
+def _compare(arguments: argparse.Namespace) -> None:
     from signface.face.reading import read_face
-    from signface.files import whole_file
-    from signface.placement import layout_study
-    from signface.placement.choosing import METHODS, Material, choose
-    from signface.render.layout_sheet import distances, draw_sheet
-    from signface.report.layouts.page import study_page
-    from signface.synth.actors import draw_actors
+    from signface.placement.choosing import METHODS, unseen_words
+    from signface.placement.comparison import ComparisonPlan, compare_layouts
+    from signface.report.layouts.report import write_report
 
     face, folder = read_face("default"), Path(arguments.output)
-    rules = _rules(arguments, face)
-    plan = layout_study.Plan(
+    plan = ComparisonPlan(
         actors=arguments.actors,
         selection=arguments.selection,
         seconds=arguments.seconds,
         sizes=_numbers(arguments.sizes),
         methods=tuple(METHODS) if arguments.methods == "all" else tuple(arguments.methods.split(",")),
-        empirical=layout_study.Plan.empirical if arguments.layouts == "all" else tuple(arguments.layouts.split(",")),
+        empirical=ComparisonPlan.empirical if arguments.layouts == "all" else tuple(arguments.layouts.split(",")),
         draws=arguments.draws,
         recommended=arguments.recommended,
         seed=arguments.seed,
     )
-    actors = draw_actors(face, plan.actors, seconds=plan.seconds, seed=plan.seed)
-    warnings = _warn(face, actors[: plan.selection])
-    print("choosing markers on actors " + ", ".join(actor.name for actor in actors[: plan.selection]), flush=True)
-    entries = layout_study.make_layouts(plan, face, actors, rules)
-    method, rivals = layout_study.recommend(plan, face, actors, rules)
-    material = Material(face, actors[: plan.selection], rules)
-    chosen = replace(choose(material, method, plan.recommended, seed=plan.seed), name=f"recommended-{plan.recommended}")
-    entries.append(layout_study.Entry(chosen, "recommended"))
-    cells = _run_cells(arguments, plan, face, actors, entries)
-    table = layout_study.collect(cells, int(face.moving.sum()))
 
-    for name, frame in (("errors", table), ("summary", layout_study.summarise(table)), ("choice_of_method", rivals)):
-        with whole_file(folder / f"{name}.csv") as temporary:
-            frame.to_csv(temporary, index=False, float_format="%.5f")
-    for entry in entries:
-        write_layout(entry.layout, folder / "layouts" / f"{entry.layout.name}.csv", face)
-    write_layout(chosen, folder / f"{chosen.name}.csv", face)
-    with whole_file(folder / f"{chosen.name}-distances.csv") as temporary:
-        distances(chosen, face).to_csv(temporary, index=False)
-    sheets = [folder / f"{chosen.name}-sheet.{ending}" for ending in ("pdf", "svg", "png")]
-    draw_sheet(face, chosen, *sheets, note=f"Chosen by: {METHODS[method]}.")
-    page = study_page(plan, face, entries, cells, table, method=method, material=material, warnings=warnings)
-    with whole_file(folder / "report.html") as temporary:
-        temporary.write_text(page, encoding="utf-8")
-    print(f"{folder / 'report.html'}: report; {chosen.name}.csv and its sheet beside it")
+    def in_sight(cells: Iterable[list[Errors]], left: int, done: int) -> Iterable[list[Errors]]:
+        if done:
+            print(f"{done} of {done + left} cells were done before", flush=True)
+        return progress(cells, "comparing layouts", total=left)
 
-
-def _run_cells(
-    arguments: argparse.Namespace, plan: Plan, face: FaceModel, actors: list[Actor], entries: list[Entry]
-) -> list[Cell]:
-    """Every cell of the study, those done before read back."""
-    import os
-
-    from joblib import Parallel, delayed
-
-    from signface.cli.progress import progress
-    from signface.placement import layout_study
-
-    tested = [actor.name for actor in actors[plan.selection :]]
-    work = [(entry, condition, draw) for entry in entries for condition, draw in layout_study.conditions(plan)]
-    folder = Path(arguments.output) / "cells"
-    files = [folder / f"{layout_study.cell_key(plan, *own, tested)}.npz" for own in work]
-    known = {file: layout_study.load_cell(file) for file in files}
-    left = {file: own for file, own in zip(files, work) if known[file] is None}
-    if len(left) < len(known):
-        print(f"{len(known) - len(left)} of {len(known)} cells were done before", flush=True)
-    jobs = min(arguments.jobs or os.cpu_count() or 1, max(1, len(left)))
-    runs = Parallel(n_jobs=jobs, return_as="generator")(
-        delayed(layout_study.run_cell)(face, *own[:1], actors, tested, *own[1:]) for own in left.values()
+    print(f"choosing markers on {plan.selection} of {plan.actors} actors", flush=True)
+    comparison = compare_layouts(
+        plan, face, _rules(arguments, face), folder=folder / "cells", jobs=arguments.jobs, progress=in_sight
     )
-    for file, errors in zip(left, progress(runs, "studying layouts", total=len(left))):
-        layout_study.save_cell(errors, file)
-        known[file] = errors
-    return [
-        layout_study.Cell(
-            entry.layout.name, entry.family, len(entry.layout.face_labels), condition, draw, tuple(errors)
-        )
-        for (entry, condition, draw), errors in ((own, known[file] or []) for own, file in zip(work, files))
-    ]
+    if comparison.unseen:
+        print(f"warning: {unseen_words(comparison.unseen)}", file=sys.stderr)
+    page = write_report(comparison, folder)
+    print(f"{page}: report; {comparison.recommended.name}.csv and its sheet beside it")
 
 
 def _numbers(word: str) -> tuple[int, ...]:
