@@ -20,7 +20,7 @@ from signface.face.model import FaceModel
 from signface.solver.creep import RATE_HZ, Creep
 from signface.solver.range_of_motion import Shown
 from signface.solver.solving import prepare_take
-from signface.synth.corpus import Job, make_plan, make_signer, make_take
+from signface.synth.corpus import TakeRequest, make_plan, make_signer, make_take
 from signface.synth.expressions import Spread
 from signface.synth.markers import head_motion, record
 from signface.takes.take import Take
@@ -76,10 +76,10 @@ def make_recordings(
     for signer in range(signers):
         for step in range(takes):
             kind, number = kinds[(signer + step) % len(kinds)]
-            job = Job(seed, signer, kind, number)
-            made = make_take(job)
+            request = TakeRequest(seed, signer, kind, number)
+            made = make_take(request)
             recordings.append(
-                _prepared(signer, job.name, made.take, made.neutral_s, made.avatar_weights.weights, face, layout)
+                _prepared(signer, request.name, made.take, made.neutral_s, made.avatar_weights.weights, face, layout)
             )
         motions.append(_range_of_motion(face, layout, seed, signer))
     return recordings, motions
@@ -104,7 +104,7 @@ def _range_of_motion(face: FaceModel, layout: MarkerLayout, seed: int, signer: i
             weights[start : start + length, other] += rng.uniform(0.0, 0.15) * shape
         begin, end = np.array([start, start + length]) / RATE + rng.normal(0.0, 0.05, 2)
         shown.append(Shown(begin, end, (face.names[base],)))
-    plan = make_plan(Job(seed, signer, "IE", 0), who.habits)
+    plan = make_plan(TakeRequest(seed, signer, "IE", 0), who.habits)
     time = np.arange(len(weights)) / RATE
     poses = head_motion(plan, time, RATE, rng)
     positions = record(who.head, who.glued, weights, poses, plan, RATE, rng)

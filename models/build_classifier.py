@@ -18,7 +18,6 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from signface.cli.progress import progress
 from signface.corpus.examples import solve_examples
 from signface.corpus.manifest import read_corpus
 from signface.evaluation.protocol import score_model
@@ -29,6 +28,7 @@ from signface.label.persistence import save_model
 from signface.label.vocabulary import AFFECTS
 from signface.learn.settings import TrainingSettings
 from signface.learn.training import Example, train_model
+from signface.progress import progress
 
 FOLDER = Path(__file__).resolve().parent / "classifiers"
 #: name: classifier and kinds of takes that it is trained on.

@@ -18,9 +18,9 @@ from signface.cli.options import (
     solve_options,
     writing_options,
 )
-from signface.cli.progress import progress
 from signface.cli.threads import one_thread_for_matrices
 from signface.errors import SignfaceError
+from signface.progress import progress
 
 if TYPE_CHECKING:
     from signface.annotation import Annotation

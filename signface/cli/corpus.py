@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 from signface.cli.options import add_face_arguments, add_writing_arguments, writing_options
-from signface.cli.progress import progress
 from signface.errors import SignfaceError
+from signface.progress import progress
 
 EXAMPLE = """  signface corpus check corpora/feel
   signface corpus run corpora/feel

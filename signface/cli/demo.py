@@ -21,12 +21,12 @@ def run(arguments: argparse.Namespace) -> int:
     """Annotate the bundled takes into a folder, with a figure of each."""
     from signface.annotation import annotate
     from signface.cli.annotate import save_picture
-    from signface.cli.progress import progress
     from signface.corpus.manifest import read_corpus
     from signface.elan.writing import write_eaf
     from signface.face.reading import read_face
     from signface.files import bundled_corpus
     from signface.label.persistence import load_model
+    from signface.progress import progress
     from signface.signer import Signer
     from signface.takes.reading import read_recording
 

@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from signface.cli.progress import progress
 from signface.errors import SignfaceError
+from signface.progress import progress
 
 if TYPE_CHECKING:
     import pandas as pd

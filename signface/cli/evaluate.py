@@ -6,10 +6,10 @@ import argparse
 from pathlib import Path
 
 from signface.cli.options import add_face_arguments
-from signface.cli.progress import progress
 from signface.cli.train import add_training_arguments, training_settings, words
 from signface.errors import SignfaceError
 from signface.label.labellers import NAMES, SEQUENCE_NAMES
+from signface.progress import progress
 
 EXAMPLE = """  signface evaluate corpora/feel -o reports/feel
   signface evaluate corpora/feel -o reports/feel --train-kinds IE,SE,EU --protocol across --classifiers net-hsmm"""

@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from signface.cli.progress import progress
 from signface.errors import SignfaceError
+from signface.progress import progress
 
 if TYPE_CHECKING:
     from signface.face.model import FaceModel

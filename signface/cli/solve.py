@@ -9,9 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from signface.cli.options import add_solve_arguments, output_files, read_face_and_layout, solve_options
-from signface.cli.progress import progress
 from signface.cli.threads import one_thread_for_matrices
 from signface.errors import SignfaceError
+from signface.progress import progress
 
 EXAMPLE = """  signface solve take.c3d -o weights.csv
   signface solve recordings/*.c3d -o weights/ --format parquet"""

@@ -84,7 +84,7 @@ def run_render(arguments: argparse.Namespace) -> None:
 
 
 def _render_study(folder: Path) -> None:
-    from signface.cli.progress import progress
+    from signface.progress import progress
     from signface.study.design import read_study
     from signface.study.films.stimuli import make_synthetic_takes, plan_films, render_study
 
@@ -136,7 +136,7 @@ def _render_file(source: Path, arguments: argparse.Namespace) -> None:
 def _write_film(
     source: Path, suffix: str, shown: dict[str, Descriptors], avatar: Avatar, arguments: argparse.Namespace
 ) -> None:
-    from signface.cli.progress import progress
+    from signface.progress import progress
     from signface.render.film import at_rate, beside, pictures_of, read_film, write_film
 
     weights = {

@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Make the corpus and say what was made."""
-    from signface.cli.progress import progress
+    from signface.progress import progress
     from signface.synth.corpus import synthesise
 
     settings = {key: getattr(arguments, key) for key in ("signers", "seed") if getattr(arguments, key) is not None}

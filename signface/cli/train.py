@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from signface.cli.options import add_face_arguments
-from signface.cli.progress import progress
 from signface.errors import SignfaceError
 from signface.label.labellers import NAMES, SEQUENCE_NAMES
+from signface.progress import progress
 
 if TYPE_CHECKING:
     from signface.learn.settings import TrainingSettings

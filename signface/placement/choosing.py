@@ -21,7 +21,7 @@ from signface.face.model import FaceModel
 from signface.placement.clusters import Clusters, cluster_markers, trajectories
 from signface.placement.empirical import find_landmarks, with_head_markers
 from signface.placement.evaluation import skin_metric
-from signface.placement.selection import Criterion, Design, Reconstruction, ThinShell, placement_noise, select
+from signface.placement.selection import Criterion, OptimalDesign, Reconstruction, ThinShell, placement_noise, select
 from signface.placement.sites import Rules, Sites, find_sites
 from signface.synth.actors import Actor
 
@@ -104,7 +104,9 @@ class Material:
     def criterion(self, method: str, count: int) -> Criterion:
         """What forward selection goes by, before any marker is chosen."""
         if method in ("a-optimal", "d-optimal"):
-            return Design(self.sites, self.face, count, skin_metric(self.face) if method == "a-optimal" else None)
+            return OptimalDesign(
+                self.sites, self.face, count, skin_metric(self.face) if method == "a-optimal" else None
+            )
         return copy.copy(self._shell if method == "thin-shell" else self._reconstruction)
 
     def clusters(self, count: int, *, seed: int = 0) -> Clusters:

@@ -1,7 +1,7 @@
 """Markers chosen one after the other, each time the one that tells most.
 
 - `Reconstruction`: what is left of the error of the best linear reconstruction of the skin, on recorded motion.
-- `Design`: the solver's own information matrix on the bases, A- or D-optimal; needs no motion.
+- `OptimalDesign`: the solver's own information matrix on the bases, A- or D-optimal; needs no motion.
 - `ThinShell`: what is left when a thin shell is pulled through the markers (B. Le, M. Zhu and Z. Deng, "Marker
   Optimization for Facial Motion Acquisition and Deformation", 2013).
 - `select`: forward selection by one of them, under the captor's rules.
@@ -161,7 +161,7 @@ class Reconstruction(_OnUnion):
         self._covariance = self._covariance - across @ np.linalg.solve(inner, across.T)
 
 
-class Design(_OnUnion):
+class OptimalDesign(_OnUnion):
     """Optimal design on the bases: the information that markers give on the weights, with the solver's thin shell.
 
     The information matrix of the solve is `M = sum over markers of B' B + shell` (eq. 5.22 and 5.25, without bounds).

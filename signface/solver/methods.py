@@ -78,7 +78,7 @@ def make_solver(
 
     learnt = {
         "rbf-network": regression.RbfNetwork,
-        "gaussian-process": regression.GaussianProcess,
-        "sparse-online-gp": regression.SparseOnlineGaussianProcess,
+        "gaussian-process": regression.GaussianProcessSolve,
+        "sparse-online-gp": regression.SparseGaussianProcessSolve,
     }
     return learnt[method](face, layout)

@@ -24,7 +24,7 @@ from signface.synth.heads import Head, draw_head
 from signface.synth.markers import JITTER_MM, glue_markers
 from signface.synth.motion import pose_track, saturate, smooth_noise
 from signface.synth.performance import group_of_bases, perform
-from signface.synth.protocol import UTTERANCES, plan_utterance
+from signface.synth.programme import UTTERANCES, plan_utterance
 
 #: Frames per second, as in Reverdy 2019, 3.4.1.
 RATE = 30.0

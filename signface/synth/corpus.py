@@ -1,7 +1,7 @@
 """The synthetic corpus: who signs what, and the files it is written to.
 
 - `synthesise`: the whole corpus into a folder.
-- `plan_corpus`, `make_take`, `write_take`: its steps, one take at a time.
+- `plan_corpus`, `make_take`, `write_synthetic_take`: its steps, one take at a time.
 
 Every take is drawn from its own stream of random numbers (seed, signer, kind, number), so that a corpus of three
 signers contains the corpus of two, and one of utterances only contains the same utterances.
@@ -34,15 +34,16 @@ from signface.synth.expressions import AFFECTS, Habits, Spread, draw_habits
 from signface.synth.heads import Head, draw_head
 from signface.synth.markers import Glued, glue_markers, head_motion, record
 from signface.synth.performance import perform
-from signface.synth.protocol import (
+from signface.synth.programme import (
     KINDS,
     UTTERANCES,
-    Plan,
+    Programme,
     plan_isolated,
     plan_sequence,
     plan_utterance,
     reference_segments,
 )
+from signface.takes.formats.c3d import write_c3d
 from signface.takes.take import Take
 
 RATE = 200.0
@@ -58,7 +59,7 @@ MINI_SEED = 20180507
 
 
 @dataclass(frozen=True)
-class Job:
+class TakeRequest:
     """A take to be made.
 
     Parameters
@@ -145,7 +146,7 @@ class SyntheticTake:
     avatar_weights: Descriptors
 
 
-def plan_corpus(*, signers: int = 2, seed: int = 0, kinds: Sequence[str] = KINDS) -> list[Job]:
+def plan_corpus(*, signers: int = 2, seed: int = 0, kinds: Sequence[str] = KINDS) -> list[TakeRequest]:
     """The takes of a corpus: six IE, six SE and eighteen EU for each signer.
 
     Raises
@@ -161,7 +162,7 @@ def plan_corpus(*, signers: int = 2, seed: int = 0, kinds: Sequence[str] = KINDS
     if seed < 0:
         raise SignfaceError(f"the seed {seed} is negative", hint="give 0 or more")
     return [
-        Job(seed, signer, kind, number)
+        TakeRequest(seed, signer, kind, number)
         for signer in range(signers)
         for kind in KINDS
         if kind in kinds
@@ -169,13 +170,13 @@ def plan_corpus(*, signers: int = 2, seed: int = 0, kinds: Sequence[str] = KINDS
     ]
 
 
-def plan_mini() -> list[Job]:
+def plan_mini() -> list[TakeRequest]:
     """The takes of `corpora/mini`: four short ones of two signers of their own."""
     return [
-        Job(MINI_SEED, 0, "IE", AFFECTS.index("J"), mini=True),
-        Job(MINI_SEED, 0, "EU", 10, mini=True),
-        Job(MINI_SEED, 1, "SE", AFFECTS.index("A"), mini=True),
-        Job(MINI_SEED, 1, "EU", 3, mini=True),
+        TakeRequest(MINI_SEED, 0, "IE", AFFECTS.index("J"), mini=True),
+        TakeRequest(MINI_SEED, 0, "EU", 10, mini=True),
+        TakeRequest(MINI_SEED, 1, "SE", AFFECTS.index("A"), mini=True),
+        TakeRequest(MINI_SEED, 1, "EU", 3, mini=True),
     ]
 
 
@@ -199,24 +200,24 @@ def make_signer(seed: int, signer: int, spread: Spread) -> Signer:
     return Signer(head, draw_habits(stream(1), spread), glue_markers(head, layout, stream(2)))
 
 
-def make_plan(job: Job, habits: Habits) -> Plan:
+def make_plan(request: TakeRequest, habits: Habits) -> Programme:
     """What happens in a take."""
-    rng = job.stream(what=0)
-    if job.kind == "IE":
-        if job.mini:
-            return plan_isolated(AFFECTS[job.number], rng, habits, times=2, held_s=(1.4, 2.0))
-        return plan_isolated(AFFECTS[job.number], rng, habits)
-    if job.kind == "SE":
-        return plan_sequence(AFFECTS[job.number], rng, habits, others=1 if job.mini else 5)
-    return plan_utterance(job.number, rng, habits, times=1 if job.mini else 3)
+    rng = request.stream(what=0)
+    if request.kind == "IE":
+        if request.mini:
+            return plan_isolated(AFFECTS[request.number], rng, habits, times=2, held_s=(1.4, 2.0))
+        return plan_isolated(AFFECTS[request.number], rng, habits)
+    if request.kind == "SE":
+        return plan_sequence(AFFECTS[request.number], rng, habits, others=1 if request.mini else 5)
+    return plan_utterance(request.number, rng, habits, times=1 if request.mini else 3)
 
 
-def make_take(job: Job, spread: Spread | None = None) -> SyntheticTake:
+def make_take(request: TakeRequest, spread: Spread | None = None) -> SyntheticTake:
     """Act and record one take.
 
     Parameters
     ----------
-    job : Job
+    request : TakeRequest
     spread : Spread, optional
         How far faces stray from the prototypes.
 
@@ -225,14 +226,14 @@ def make_take(job: Job, spread: Spread | None = None) -> SyntheticTake:
     SyntheticTake
     """
     spread = Spread() if spread is None else spread
-    signer = make_signer(job.seed, job.signer, spread)
-    plan = make_plan(job, signer.habits)
+    signer = make_signer(request.seed, request.signer, spread)
+    plan = make_plan(request, signer.habits)
     names = signer.head.face.names
     time = np.arange(round(plan.duration * RATE)) / RATE
-    weights = perform(plan, time, signer.habits, spread, names, job.stream(what=1))
-    poses = head_motion(plan, time, RATE, job.stream(what=2))
-    positions = record(signer.head, signer.glued, weights, poses, plan, RATE, job.stream(what=3))
-    take = Take(positions, signer.glued.labels, RATE, name=job.name, history=("synthetic",))
+    weights = perform(plan, time, signer.habits, spread, names, request.stream(what=1))
+    poses = head_motion(plan, time, RATE, request.stream(what=2))
+    positions = record(signer.head, signer.glued, weights, poses, plan, RATE, request.stream(what=3))
+    take = Take(positions, signer.glued.labels, RATE, name=request.name, history=("synthetic",))
     seen = np.isfinite(positions).all(axis=(1, 2))
     resting = (time > 0.1) & (time < plan.phases[0].end_s - 0.2)
     effort = np.where(seen & resting, weights.sum(axis=1), np.inf)
@@ -241,60 +242,47 @@ def make_take(job: Job, spread: Spread | None = None) -> SyntheticTake:
 
     def descriptors(values: np.ndarray) -> Descriptors:
         # Half a thousandth is two hundredths of a millimetre at most on the skin, and compresses well.
-        return Descriptors(np.round(values, 3), names, RATE, residual=np.zeros(len(time)), head=poses, name=job.name)
+        return Descriptors(
+            np.round(values, 3), names, RATE, residual=np.zeros(len(time)), head=poses, name=request.name
+        )
 
     return SyntheticTake(
         take=take,
-        reference=reference_segments(plan, job.name, job.stream(what=4)),
+        reference=reference_segments(plan, request.name, request.stream(what=4)),
         neutral_s=float(time[np.argmin(effort)]),
-        boundaries=reference_segments(plan, job.name),
+        boundaries=reference_segments(plan, request.name),
         weights=descriptors(weights),
         avatar_weights=descriptors(signer.head.avatar_weights(weights)),
     )
 
 
-def write_take(folder: Path, job: Job, made: SyntheticTake) -> TakeEntry:
+def write_synthetic_take(folder: Path, request: TakeRequest, made: SyntheticTake) -> TakeEntry:
     """Write a take (`NAME.c3d`), its annotation under `reference/` and the truth about it under `truth/`.
 
     The annotation does not stand beside the recording: that is where `signface annotate` puts its own.
     """
-    recording = folder / f"{job.name}.c3d"
-    with whole_file(recording) as temporary:
-        write_c3d(made.take, temporary)
-    annotation = annotation_of(folder, job)
+    recording = folder / f"{request.name}.c3d"
+    write_c3d(made.take, recording)
+    annotation = annotation_of(folder, request)
     write_eaf(
         made.reference,
         annotation,
-        signer=job.signer_name,
+        signer=request.signer_name,
         date=DATE,
         properties={"take": recording.name, "note": "synthetic: no person is recorded"},
     )
-    truth = folder / "truth" / job.name
+    truth = folder / "truth" / request.name
     write_weights(made.avatar_weights, truth.with_suffix(".parquet"))
     write_weights(made.weights, truth.with_suffix(".signer.parquet"))
     write_segments(made.boundaries, truth.with_suffix(".segments.csv"))
-    return TakeEntry(recording, job.signer_name, job.kind, annotation, made.neutral_s, sentence=job.sentence)
+    return TakeEntry(
+        recording, request.signer_name, request.kind, annotation, made.neutral_s, sentence=request.sentence
+    )
 
 
-def annotation_of(folder: Path, job: Job) -> Path:
+def annotation_of(folder: Path, request: TakeRequest) -> Path:
     """Where the reference annotation of a take stands."""
-    return folder / "reference" / f"{job.name}.eaf"
-
-
-def write_c3d(take: Take, path: str | PathLike[str]) -> None:
-    """Write a take as C3D (float, millimetres); a missing marker has the residual -1."""
-    import ezc3d
-
-    c3d = ezc3d.c3d()
-    c3d["parameters"]["POINT"]["RATE"]["value"] = [take.rate]
-    c3d["parameters"]["POINT"]["LABELS"]["value"] = list(take.labels)
-    c3d["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
-    points = np.ones((4, len(take.labels), take.n_frames))
-    points[:3] = take.positions.transpose(2, 1, 0)
-    missing = np.isnan(points[0])
-    c3d["data"]["points"] = points
-    c3d["data"]["meta_points"]["residuals"] = np.where(missing, -1.0, 0.0)[None]
-    c3d.write(str(path))
+    return folder / "reference" / f"{request.name}.eaf"
 
 
 def synthesise(
@@ -304,7 +292,7 @@ def synthesise(
     seed: int = 0,
     kinds: Sequence[str] = KINDS,
     mini: bool = False,
-    show: Callable[[list[Job]], Iterable[Job]] = iter,
+    show: Callable[[list[TakeRequest]], Iterable[TakeRequest]] = iter,
 ) -> Corpus:
     """Make a synthetic corpus.
 
@@ -333,24 +321,26 @@ def synthesise(
     >>> corpus = synthesise("corpora/feel", signers=3)  # doctest: +SKIP
     """
     folder = Path(folder)
-    jobs = plan_mini() if mini else plan_corpus(signers=signers, seed=seed, kinds=kinds)
+    requests = plan_mini() if mini else plan_corpus(signers=signers, seed=seed, kinds=kinds)
     spread = Spread()
     settings = {
         "made_by": "signface synth",
         "note": "synthetic: no person is recorded",
         "edition": EDITION,
-        "seed": jobs[0].seed,
-        "takes": [job.name for job in jobs],
+        "seed": requests[0].seed,
+        "takes": [request.name for request in requests],
         "spread": asdict(spread),
     }
-    _make_sure_it_is_ours(folder, settings, jobs)
+    _make_sure_it_is_ours(folder, settings, requests)
     with whole_file(folder / RECORD) as temporary:
         temporary.write_text(json.dumps(settings, indent=1) + "\n", encoding="utf-8")
-    write_takes(folder, [write_take(folder, job, make_take(job, spread)) for job in show(jobs)])
+    write_takes(
+        folder, [write_synthetic_take(folder, request, make_take(request, spread)) for request in show(requests)]
+    )
     return read_corpus(folder)
 
 
-def _make_sure_it_is_ours(folder: Path, settings: dict, jobs: list[Job]) -> None:
+def _make_sure_it_is_ours(folder: Path, settings: dict, requests: list[TakeRequest]) -> None:
     if not folder.exists():
         return
     if not folder.is_dir():
@@ -367,8 +357,8 @@ def _make_sure_it_is_ours(folder: Path, settings: dict, jobs: list[Job]) -> None
         raise SignfaceError("cannot be read", file=record_file, hint=elsewhere) from error
     if previous != json.loads(json.dumps(settings)):
         raise SignfaceError("holds a corpus made with other settings", file=folder, hint=elsewhere)
-    for job in jobs:
-        annotation = annotation_of(folder, job)
+    for request in requests:
+        annotation = annotation_of(folder, request)
         if annotation.exists() and not is_unmodified_output(read_document(annotation).getroot()):
             raise SignfaceError(
                 "was corrected since it was made", file=annotation, hint=f"{elsewhere}, or move it away first"

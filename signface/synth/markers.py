@@ -24,7 +24,7 @@ from signface.face.layout_files import nearest_points
 from signface.face.mesh import Mesh
 from signface.synth.heads import Head
 from signface.synth.motion import smooth_noise
-from signface.synth.protocol import Plan
+from signface.synth.programme import Programme
 from signface.synth.signing import GRAMMAR, head_gestures
 
 #: How far from the layout's point a marker is glued, along the skin.
@@ -94,7 +94,7 @@ def _walks(mesh: Mesh, sources: np.ndarray, limit: float) -> np.ndarray:
     return dijkstra(graph, directed=False, indices=sources, limit=limit)
 
 
-def head_motion(plan: Plan, time: np.ndarray, rate: float, rng: np.random.Generator) -> np.ndarray:
+def head_motion(plan: Programme, time: np.ndarray, rate: float, rng: np.random.Generator) -> np.ndarray:
     """(F, 4, 4) pose of the head in the room, Z up, as it sways and makes the gestures of its clauses.
 
     The signer stands a little off the room's origin and does not face along an axis.
@@ -121,7 +121,13 @@ def head_motion(plan: Plan, time: np.ndarray, rate: float, rng: np.random.Genera
 
 
 def record(
-    head: Head, glued: Glued, weights: np.ndarray, poses: np.ndarray, plan: Plan, rate: float, rng: np.random.Generator
+    head: Head,
+    glued: Glued,
+    weights: np.ndarray,
+    poses: np.ndarray,
+    plan: Programme,
+    rate: float,
+    rng: np.random.Generator,
 ) -> np.ndarray:
     """Trajectories of the markers as the cameras give them.
 
@@ -134,7 +140,7 @@ def record(
         Weights of the head's own bases.
     poses : (F, 4, 4) array
         Pose of the head in the room.
-    plan : Plan
+    plan : Programme
         When hands are busy.
     rate : float
         Hz.
@@ -161,7 +167,7 @@ def record(
     return markers
 
 
-def _lost(glued: Glued, head: Head, plan: Plan, frames: int, rate: float, rng: np.random.Generator) -> np.ndarray:
+def _lost(glued: Glued, head: Head, plan: Programme, frames: int, rate: float, rng: np.random.Generator) -> np.ndarray:
     """(F, M) bool: where a marker is not seen.
 
     Single markers are lost now and then; while somebody signs, a hand hides neighbouring markers of the lower face.

@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from signface.synth.expressions import NEUTRAL, Habits, Spread, base_weights, draw_face
 from signface.synth.motion import pose_track, pulse, saturate, smooth_noise
-from signface.synth.protocol import Plan
+from signface.synth.programme import Programme
 from signface.synth.signing import GRAMMAR, blinks, glances, grammar_track, mouthing
 
 #: Parts of the face that move in their own time.
@@ -28,13 +28,13 @@ def group_of_bases(names: tuple[str, ...]) -> np.ndarray:
 
 
 def perform(
-    plan: Plan, time: np.ndarray, habits: Habits, spread: Spread, names: tuple[str, ...], rng: np.random.Generator
+    plan: Programme, time: np.ndarray, habits: Habits, spread: Spread, names: tuple[str, ...], rng: np.random.Generator
 ) -> np.ndarray:
     """(F, N) weights of a signer's own bases in a take, in [0, 1].
 
     Parameters
     ----------
-    plan : Plan
+    plan : Programme
     time : (F,) array
         Seconds, evenly spaced.
     habits : Habits
@@ -71,7 +71,7 @@ def perform(
 
 
 def _affect(
-    plan: Plan,
+    plan: Programme,
     time: np.ndarray,
     rate: float,
     habits: Habits,

@@ -19,7 +19,7 @@ from signface.takes.labels import find_labels
 from signface.takes.recording import PIECE, Recording, pieces
 from signface.takes.take import Take
 
-#: Goes through pieces, showing how far we are: `progress(pieces, "cleaning")`, as `signface.cli.progress.progress`.
+#: Goes through pieces, showing how far we are: `progress(pieces, "cleaning")`, as `signface.progress.progress`.
 Progress = Callable[[Sequence[tuple[int, int]], str], Iterable[tuple[int, int]]]
 
 

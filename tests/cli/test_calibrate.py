@@ -12,7 +12,7 @@ from signface.cli.main import main
 from signface.descriptors_files import read_weights
 from signface.face.files.gltf import write_face
 from signface.face.layout_files import read_layout, write_layout
-from signface.synth.corpus import write_c3d
+from signface.takes.formats.c3d import write_c3d
 from signface.takes.take import Take
 
 SHOWN = ("browInnerUp", "browDownLeft+browDownRight", "mouthSmile*", "jawOpen")

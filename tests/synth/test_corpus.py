@@ -15,7 +15,7 @@ from signface.segmentation.segments import read_segments
 from signface.synth.corpus import (
     MINI_SEED,
     RATE,
-    Job,
+    TakeRequest,
     make_plan,
     make_signer,
     make_take,
@@ -24,7 +24,7 @@ from signface.synth.corpus import (
     synthesise,
 )
 from signface.synth.expressions import AFFECTS, Spread
-from signface.synth.protocol import UTTERANCES
+from signface.synth.programme import UTTERANCES
 from signface.takes.reading import read_take
 
 
@@ -60,7 +60,7 @@ def test_the_shipped_corpus_is_what_the_command_makes(mini):
 
 
 def test_another_seed_gives_other_signers():
-    takes = [make_take(Job(seed, 0, "EU", 5)).take for seed in (0, 1)]
+    takes = [make_take(TakeRequest(seed, 0, "EU", 5)).take for seed in (0, 1)]
     assert takes[0].n_frames != takes[1].n_frames
     heads = [make_signer(seed, signer, Spread()).head.face.mesh.vertices for seed, signer in [(0, 0), (0, 1), (1, 0)]]
     for i, j in ((0, 1), (0, 2), (1, 2)):
@@ -71,11 +71,11 @@ def test_more_signers_or_fewer_kinds_do_not_change_a_take():
     two, three = plan_corpus(signers=2), plan_corpus(signers=3)
     assert set(two) < set(three)
     assert set(plan_corpus(signers=2, kinds=["EU"])) < set(two)
-    assert MINI_SEED not in {job.seed for job in two}
+    assert MINI_SEED not in {request.seed for request in two}
 
 
 def test_a_corpus_has_the_takes_of_the_protocol():
-    names = [job.name for job in plan_corpus(signers=2)]
+    names = [request.name for request in plan_corpus(signers=2)]
     assert len(set(names)) == len(names) == 2 * (6 + 6 + 18)
     assert names[0] == "S1_IE_A"
     assert names[-1] == "S2_EU_18"
@@ -83,14 +83,14 @@ def test_a_corpus_has_the_takes_of_the_protocol():
 
 def test_isolated_expressions_return_to_neutral_five_times():
     for number, affect in enumerate(AFFECTS):
-        job = Job(4, 0, "IE", number)
-        plan = make_plan(job, make_signer(4, 0, Spread()).habits)
+        request = TakeRequest(4, 0, "IE", number)
+        plan = make_plan(request, make_signer(4, 0, Spread()).habits)
         assert [phase.affect for phase in plan.phases] == ["N", *[affect, "N"] * 5]
         assert {phase.intensity for phase in plan.phases if phase.affect != "N"} == {1, 2, 3}
 
 
 def test_a_sequence_alternates_one_expression_with_each_other_one():
-    plan = make_plan(Job(4, 0, "SE", 2), make_signer(4, 0, Spread()).habits)
+    plan = make_plan(TakeRequest(4, 0, "SE", 2), make_signer(4, 0, Spread()).habits)
     affects = [phase.affect for phase in plan.phases]
     assert affects[0] == affects[-1] == "N"
     assert affects[1:-1:2] == ["F"] * 6
@@ -99,16 +99,16 @@ def test_a_sequence_alternates_one_expression_with_each_other_one():
 
 def test_an_utterance_is_signed_three_times_with_its_affects():
     for number, utterance in enumerate(UTTERANCES):
-        plan = make_plan(Job(4, 1, "EU", number), make_signer(4, 1, Spread()).habits)
+        plan = make_plan(TakeRequest(4, 1, "EU", number), make_signer(4, 1, Spread()).habits)
         once = [affect for affect, _ in utterance.affects]
         assert [phase.affect for phase in plan.phases] == ["N", *[*once, "N"] * 3]
         assert len(plan.clauses) == 3
 
 
 def test_recordings_come_back_from_c3d_in_millimetres(mini):
-    for job in plan_mini():
-        made = make_take(job).take
-        read = read_take(mini / f"{job.name}.c3d")
+    for request in plan_mini():
+        made = make_take(request).take
+        read = read_take(mini / f"{request.name}.c3d")
         assert read.labels == made.labels
         assert read.rate == made.rate == RATE
         np.testing.assert_array_equal(np.isnan(read.positions), np.isnan(made.positions))
@@ -127,9 +127,9 @@ def test_forty_markers_on_the_face_and_six_on_the_head():
 
 def test_reference_annotations_say_affect_and_intensity(mini):
     corpus = read_corpus(mini)
-    for entry, job in zip(corpus, plan_mini()):
+    for entry, request in zip(corpus, plan_mini()):
         table = read_reference(entry.annotation, entry.signer).table
-        plan = make_plan(job, make_signer(job.seed, job.signer, Spread()).habits)
+        plan = make_plan(request, make_signer(request.seed, request.signer, Spread()).habits)
         stable = table[table["kind"] == "stable"]
         labels = [phase.affect for phase in plan.phases]
         merged = [label for i, label in enumerate(labels) if i == 0 or label != labels[i - 1]]
@@ -142,8 +142,8 @@ def test_reference_annotations_say_affect_and_intensity(mini):
 
 def test_the_annotator_is_uncertain_by_tens_of_milliseconds():
     errors = []
-    for job in plan_corpus(signers=1, seed=3, kinds=["IE"]):
-        made = make_take(job)
+    for request in plan_corpus(signers=1, seed=3, kinds=["IE"]):
+        made = make_take(request)
         errors.extend(made.reference.table["start_s"][1:] - made.boundaries.table["start_s"][1:])
     assert 0.025 < np.std(errors) < 0.085
     assert np.abs(errors).max() < 0.25

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from signface.face.layout_files import read_layout
 from signface.face.reading import read_face
-from signface.synth.corpus import Job, make_plan, make_signer, make_take
+from signface.synth.corpus import TakeRequest, make_plan, make_signer, make_take
 from signface.synth.expressions import (
     AFFECTS,
     MIXTURES,
@@ -71,8 +71,8 @@ def test_a_signer_has_another_head_than_the_avatar(avatar, signer):
 
 
 def test_the_skin_of_a_signer_is_not_the_avatars_but_near_it(avatar, signer):
-    job = Job(11, 0, "EU", 9)
-    weights = make_take(job).weights.weights[::40]
+    request = TakeRequest(11, 0, "EU", 9)
+    weights = make_take(request).weights.weights[::40]
     moving = np.flatnonzero(avatar.moving)
     own = signer.head.skin(weights, moving) - signer.head.face.mesh.vertices[moving]
     shown = avatar.pose(signer.head.avatar_weights(weights))[:, moving] - avatar.mesh.vertices[moving]
@@ -119,7 +119,7 @@ def test_markers_are_glued_one_to_three_millimetres_off(avatar, signer):
 
 
 def test_markers_jitter_by_tenths_of_a_millimetre():
-    take = make_take(Job(11, 0, "IE", 3)).take
+    take = make_take(TakeRequest(11, 0, "IE", 3)).take
     still = take.positions[20:120]
     # Second differences leave noise and take slow movement away; white noise grows by sqrt(6) in them.
     jitter = np.sqrt(np.nanmean(np.diff(still, 2, axis=0) ** 2, axis=0).sum(axis=1) / 6.0)
@@ -130,7 +130,7 @@ def test_markers_jitter_by_tenths_of_a_millimetre():
 def test_lost_markers_come_back_within_some_tenths_of_a_second():
     lengths = []
     for number in range(4):
-        take = make_take(Job(11, 0, "EU", number)).take
+        take = make_take(TakeRequest(11, 0, "EU", number)).take
         missing = np.isnan(take.positions[:, :, 0])
         assert 0.0 < missing.mean() < 0.05
         for marker in missing.T:
@@ -143,7 +143,7 @@ def test_lost_markers_come_back_within_some_tenths_of_a_second():
 def test_weights_stay_between_nothing_and_everything(avatar):
     for seed, number in ((0, 3), (1, 16)):
         habits = make_signer(seed, 0, Spread()).habits
-        plan = make_plan(Job(seed, 0, "EU", number), habits)
+        plan = make_plan(TakeRequest(seed, 0, "EU", number), habits)
         time = np.arange(round(plan.duration * 100)) / 100
         weights = perform(plan, time, habits, Spread(), avatar.names, np.random.default_rng(seed))
         assert weights.min() >= 0.0
@@ -152,7 +152,7 @@ def test_weights_stay_between_nothing_and_everything(avatar):
 
 
 def test_utterances_move_the_mouth_and_the_head_more_than_isolated_expressions():
-    uttered, isolated = make_take(Job(11, 0, "EU", 9)), make_take(Job(11, 0, "IE", 3))
+    uttered, isolated = make_take(TakeRequest(11, 0, "EU", 9)), make_take(TakeRequest(11, 0, "IE", 3))
     jaw = uttered.weights.names.index("jawOpen")
     speed = [np.abs(np.gradient(made.weights.weights[:, jaw], 1 / 200)).mean() for made in (uttered, isolated)]
     assert speed[0] > 2 * speed[1]

@@ -1,8 +1,8 @@
 """Mappings learnt from pairs of markers and weights.
 
 - `RbfNetwork`: a radial basis function network (Reverdy 2019, eq. 2.13 and 2.14).
-- `GaussianProcess`: Gaussian process regression.
-- `SparseOnlineGaussianProcess`: its sparse online form (Csato and Opper, "Sparse On-Line Gaussian Processes", Neural
+- `GaussianProcessSolve`: Gaussian process regression.
+- `SparseGaussianProcessSolve`: its sparse online form (Csato and Opper, "Sparse On-Line Gaussian Processes", Neural
   Computation 14, 2002; Reverdy 2019, 3.3.1).
 - `example_pairs`: pairs made with the avatar, where none were recorded.
 
@@ -105,7 +105,7 @@ class RbfNetwork(_Learnt):
         return _gaussian(inputs, self._centres, self._width) @ self._coefficients
 
 
-class GaussianProcess(_Learnt):
+class GaussianProcessSolve(_Learnt):
     """Gaussian process regression, see `signface.solver.rivals.gaussian_process`."""
 
     def _learn(self, inputs: np.ndarray, weights: np.ndarray) -> None:
@@ -115,7 +115,7 @@ class GaussianProcess(_Learnt):
         return self._process.predict(inputs)
 
 
-class SparseOnlineGaussianProcess(_Learnt):
+class SparseGaussianProcessSolve(_Learnt):
     """A Gaussian process that takes one pair at a time and keeps the most telling of them."""
 
     def _learn(self, inputs: np.ndarray, weights: np.ndarray) -> None:

@@ -329,15 +329,17 @@ def make_synthetic_takes(folder: Path, signer: int, *, show: Callable[[Iterable]
         Wraps the list of takes, for a progress bar.
     """
     from signface.descriptors_files import write_weights
-    from signface.synth.corpus import make_take, plan_corpus, write_c3d
+    from signface.synth.corpus import make_take, plan_corpus
+    from signface.takes.formats.c3d import write_c3d
 
-    jobs = [job for job in plan_corpus(signers=signer + 1, seed=6, kinds=["IE"]) if job.signer == signer]
+    requests = [
+        request for request in plan_corpus(signers=signer + 1, seed=6, kinds=["IE"]) if request.signer == signer
+    ]
     rows = []
-    for job in show(jobs):
-        made = make_take(job)
-        with whole_file(folder / f"{job.name}.c3d") as temporary:
-            write_c3d(made.take, temporary)
-        write_weights(made.avatar_weights, folder / "weights" / f"{job.name}.parquet")
+    for request in show(requests):
+        made = make_take(request)
+        write_c3d(made.take, folder / f"{request.name}.c3d")
+        write_weights(made.avatar_weights, folder / "weights" / f"{request.name}.parquet")
         table = made.boundaries.table
         for intensity in (1, 2, 3):
             held = table[(table["kind"] == "stable") & (table["intensity"] == intensity)]
@@ -346,6 +348,6 @@ def make_synthetic_takes(folder: Path, signer: int, *, show: Callable[[Iterable]
             first = held.iloc[0]
             start = max(0.0, float(first["start_s"]) - AROUND_S - CHANGE_S)
             end = min(made.take.time[-1], float(first["end_s"]) + AROUND_S + CHANGE_S)
-            rows.append((f"{first['label']}{intensity}", f"{job.name}.c3d", f"{start:.3f}", f"{end:.3f}"))
+            rows.append((f"{first['label']}{intensity}", f"{request.name}.c3d", f"{start:.3f}", f"{end:.3f}"))
     with whole_file(folder / "excerpts.csv") as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([("excerpt", "take", "start_s", "end_s"), *rows])

@@ -1,4 +1,4 @@
-"""The protocol of the synthetic corpus: what a signer is asked to do in each take.
+"""The programme of a take of the synthetic corpus: what a signer is asked to do.
 
 - `plan_isolated` (IE), `plan_sequence` (SE), `plan_utterance` (EU): the phases of a take.
 - `UTTERANCES`: the eighteen utterances, each with its affects and its grammar.
@@ -62,7 +62,7 @@ class Clause:
 
 
 @dataclass(frozen=True)
-class Plan:
+class Programme:
     """What happens in a take.
 
     Parameters
@@ -148,8 +148,8 @@ class _Course:
         self.now = phase.end_s
         return phase
 
-    def plan(self, clauses: tuple[Clause, ...] = ()) -> Plan:
-        return Plan(tuple(self.phases), clauses, self.now)
+    def plan(self, clauses: tuple[Clause, ...] = ()) -> Programme:
+        return Programme(tuple(self.phases), clauses, self.now)
 
 
 def plan_isolated(
@@ -159,7 +159,7 @@ def plan_isolated(
     *,
     times: int = 5,
     held_s: tuple[float, float] = (2.0, 3.6),
-) -> Plan:
+) -> Programme:
     """IE: one expression, held for seconds, `times` over, neutral before, between and after."""
     course = _Course(rng, habits)
     intensities = _intensities(rng, times)
@@ -170,7 +170,7 @@ def plan_isolated(
     return course.plan()
 
 
-def plan_sequence(affect: str, rng: np.random.Generator, habits: Habits, *, others: int = 5) -> Plan:
+def plan_sequence(affect: str, rng: np.random.Generator, habits: Habits, *, others: int = 5) -> Programme:
     """SE: one expression alternating with each other one (in a drawn order), neutral at both ends."""
     course = _Course(rng, habits)
     order = rng.permutation([other for other in AFFECTS if other != affect])[:others]
@@ -184,7 +184,7 @@ def plan_sequence(affect: str, rng: np.random.Generator, habits: Habits, *, othe
     return course.plan()
 
 
-def plan_utterance(number: int, rng: np.random.Generator, habits: Habits, *, times: int = 3) -> Plan:
+def plan_utterance(number: int, rng: np.random.Generator, habits: Habits, *, times: int = 3) -> Programme:
     """EU: utterance `number` (from 0) with its affects, `times` over, a rest between."""
     utterance = UTTERANCES[number]
     course = _Course(rng, habits)
@@ -224,12 +224,12 @@ def _marked(
     return tuple(marked)
 
 
-def reference_segments(plan: Plan, name: str, rng: np.random.Generator | None = None) -> Segments:
+def reference_segments(plan: Programme, name: str, rng: np.random.Generator | None = None) -> Segments:
     """Stable segments and transitions as an annotator sees them.
 
     Parameters
     ----------
-    plan : Plan
+    plan : Programme
     name : str
         Name of the take.
     rng : numpy Generator, optional
@@ -275,7 +275,7 @@ def _merged(phases: tuple[Phase, ...]) -> list[Phase]:
     return merged
 
 
-def _in_order(boundaries: np.ndarray, plan: Plan, least_s: float = 0.06) -> list[float]:
+def _in_order(boundaries: np.ndarray, plan: Programme, least_s: float = 0.06) -> list[float]:
     """Boundaries to the millisecond, each at least `least_s` after the one before, inside the take."""
     ordered: list[float] = []
     for boundary in boundaries:
