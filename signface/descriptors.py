@@ -54,6 +54,23 @@ class Descriptors(TimedArrays, Content):
         Standard deviation of each weight; NaN where the markers say nothing. None when it was not asked for.
     settings : SolveSettings, optional
         How the weights were solved; None where that is not known, or nothing was solved.
+
+    See Also
+    --------
+    signface.solve, signface.read_weights : where they come from.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> weights = sf.datasets.mini_weights()
+    >>> weights.n_frames, weights.names[:2]
+    (1184, ('eyeBlinkLeft', 'eyeLookDownLeft'))
+    >>> weights.weight("jawOpen").shape
+    (1184,)
+    >>> weights.between(1.0, 2.0).duration
+    1.0
+    >>> weights.to_frame().columns[:3].tolist()
+    ['eyeBlinkLeft', 'eyeLookDownLeft', 'eyeLookInLeft']
     """
 
     weights: np.ndarray

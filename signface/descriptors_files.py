@@ -244,6 +244,17 @@ def read_weights(path: str | PathLike[str]) -> Descriptors:
     SignfaceError
         The file is missing or is no weights file, has fewer than two rows and says no rate, its times do not rise
         evenly, or it was written by a newer signface.
+
+    See Also
+    --------
+    signface.write_weights : the way to disk.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> sf.write_weights(sf.datasets.mini_weights(), "weights.parquet")
+    >>> sf.read_weights("weights.parquet").n_frames
+    1184
     """
     file = Path(path)
     if not file.is_file():

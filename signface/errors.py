@@ -52,4 +52,14 @@ class SignfaceError(Exception):
 
 
 class SignfaceWarning(UserWarning):
-    """Something a user should know of a result that was given all the same; the command line prints it as one line."""
+    """Something a user should know of a result that was given all the same; the command line prints it as one line.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> with warnings.catch_warnings(record=True) as caught:
+    ...     warnings.simplefilter("always")
+    ...     warnings.warn("two head markers were seen in one frame only", SignfaceWarning)
+    >>> print(caught[0].message)
+    two head markers were seen in one frame only
+    """

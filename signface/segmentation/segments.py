@@ -33,6 +33,19 @@ class Segments(Content):
         Name of the take.
     history : tuple of str
         What was done, oldest first.
+
+    See Also
+    --------
+    signface.segment, signface.annotate : where they come from.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> segments = sf.datasets.mini_reference()
+    >>> segments.labelled, len(segments.table)
+    (True, 5)
+    >>> segments.table.columns.tolist()
+    ['start_s', 'end_s', 'kind', 'label', 'intensity']
     """
 
     table: pd.DataFrame
@@ -106,7 +119,19 @@ class Segments(Content):
 
 
 def write_segments(segments: Segments, path: str | PathLike[str]) -> None:
-    """Write the table as .csv, times to the tenth of a millisecond."""
+    """Write the table as .csv, times to the tenth of a millisecond.
+
+    See Also
+    --------
+    signface.read_segments : the way back.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> sf.write_segments(sf.datasets.mini_reference(), "segments.csv")
+    >>> open("segments.csv").readline().strip()
+    'start_s,end_s,kind,label,intensity'
+    """
     if Path(path).suffix.lower() != ".csv":
         raise SignfaceError("segments are written as .csv", file=path)
     with whole_file(path) as temporary:
@@ -120,6 +145,17 @@ def read_segments(path: str | PathLike[str]) -> Segments:
     ------
     SignfaceError
         The file is missing or is no table of segments.
+
+    See Also
+    --------
+    signface.write_segments : the way to disk.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> sf.write_segments(sf.datasets.mini_reference(), "segments.csv")
+    >>> sf.read_segments("segments.csv").table["label"].tolist()
+    ['N', 'ND', 'D', 'DN', 'N']
     """
     file = Path(path)
     if not file.is_file():

@@ -41,6 +41,19 @@ class Take(TimedArrays, Content):
     ------
     SignfaceError
         Shapes disagree, a label is repeated, the rate is not positive, or there is no frame.
+
+    See Also
+    --------
+    signface.read_take : where takes come from.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> take = sf.datasets.mini_take()
+    >>> take.positions.shape, take.rate, take.labels[0]
+    ((1184, 46, 3), 200.0, 'LBROI')
+    >>> take.between(1.0, 2.0).duration
+    1.0
     """
 
     positions: np.ndarray
