@@ -1,7 +1,7 @@
 """Synthetic signers whom no solver has met, with their takes brought to the avatar.
 
 - `make_recordings`: takes of some signers, prepared for solving, with the weights that show the same on the avatar.
-- `without_creep`: displacements with what the markers crept taken away, as `solve_take` does.
+- `without_creep`: displacements with what the markers crept taken away, as `solve` does.
 - `slipped`: displacements in which markers have slipped.
 - `own_face`: markers on the avatar itself.
 
@@ -17,6 +17,7 @@ import numpy as np
 
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
+from signface.settings.solve import SolveSettings
 from signface.solver.creep import RATE_HZ, Creep
 from signface.solver.range_of_motion import Shown
 from signface.solver.solving import prepare_take
@@ -55,7 +56,9 @@ def _prepared(
     signer: int, name: str, take: Take, neutral_s: float, weights: np.ndarray, face, layout, shown=()
 ) -> Recording:
     displacements = {
-        adaptation: prepare_take(take, face, layout, neutral=neutral_s, adaptation=adaptation).displacements
+        adaptation: prepare_take(
+            take, face, layout, settings=SolveSettings(neutral=neutral_s, adaptation=adaptation, creep=False)
+        ).displacements
         for adaptation in ("similarity", "rbf")
     }
     return Recording(signer, name, displacements, weights, tuple(shown))

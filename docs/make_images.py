@@ -11,6 +11,7 @@ from signface.face.reading import read_face
 from signface.label.persistence import load_model
 from signface.report.overview import draw_overview
 from signface.report.timeline import save_figure
+from signface.settings.solve import SolveSettings
 from signface.takes.reading import read_recording
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -20,7 +21,9 @@ def main() -> None:
     """Draw `images/overview.png` from a bundled synthetic take."""
     entry = next(entry for entry in read_corpus(ROOT / "corpora" / "mini").takes if entry.kind == "SE")
     face = read_face("default")
-    found = annotate(read_recording(entry.path), load_model("default"), face=face, neutral=entry.neutral_s)
+    found = annotate(
+        read_recording(entry.path), load_model("default"), face=face, settings=SolveSettings(neutral=entry.neutral_s)
+    )
     figure = draw_overview(
         found.descriptors,
         found.segments,

@@ -22,13 +22,14 @@ from signface.corpus.examples import solve_examples
 from signface.corpus.manifest import read_corpus
 from signface.evaluation.protocol import score_model
 from signface.files import whole_file
-from signface.label.labellers import NAMES, SEQUENCE_NAMES
 from signface.label.model import Card
 from signface.label.persistence import save_model
 from signface.label.vocabulary import AFFECTS
-from signface.learn.settings import TrainingSettings
 from signface.learn.training import Example, train_model
 from signface.progress import progress
+from signface.settings.choices import NAMES, SEQUENCE_NAMES
+from signface.settings.solve import SolveSettings
+from signface.settings.training import TrainingSettings
 
 FOLDER = Path(__file__).resolve().parent / "classifiers"
 #: name: classifier and kinds of takes that it is trained on.
@@ -73,8 +74,7 @@ def build(name: str, train: list[Example], test: list[Example]) -> None:
     model = train_model(
         [example for example in train if example.kind in kinds],
         TrainingSettings(classifier=classifier, calibrate=False),
-        face="default",
-        layout="default-40",
+        solve=SolveSettings(layout="default-40"),
         corpus="synthetic (signface synth)",
         name=name,
     )

@@ -4,7 +4,6 @@ from .corpus.manifest import Corpus, read_corpus
 from .corpus.running import run_corpus
 from .descriptors import Descriptors
 from .descriptors_files import read_weights, write_weights
-from .elan.options import EafOptions
 from .elan.reference import read_reference, read_tiers
 from .elan.writing import write_eaf
 from .errors import SignfaceError, SignfaceWarning
@@ -17,17 +16,18 @@ from .label.labellers import make_labeller
 from .label.labelling import label_segments
 from .label.model import TrainedModel
 from .label.persistence import load_model, save_model
-from .laboratory import read_settings
 from .learn.examples import Example, frame_table
-from .learn.settings import TrainingSettings
 from .metrics.agreement import agreement_table
 from .render.still import draw_face
 from .report.timeline import draw_timeline
 from .segmentation.cutting import segment
 from .segmentation.energy import energies
 from .segmentation.segments import Segments, read_segments, write_segments
+from .settings.eaf import EafOptions
+from .settings.laboratory import read_settings
+from .settings.solve import SolveSettings
+from .settings.training import TrainingSettings
 from .signer import Signer
-from .solve_settings import SolveSettings
 from .takes.reading import open_recording, read_recording, read_take
 from .takes.take import Take
 

@@ -2,7 +2,6 @@
 
 - `annotate`: recording to `Annotation`.
 - `Annotation`: descriptors, labelled segments, channels, curves, and what found them.
-- `describe`, `describe_pieces`: the first half, recording to descriptors.
 
 The steps themselves live in their rooms; this module only puts them in a row. `signface.elan.writing.write_eaf` writes
 an annotation for ELAN.
@@ -10,7 +9,7 @@ an annotation for ELAN.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -26,11 +25,12 @@ if TYPE_CHECKING:
     from pympi.Elan import Eaf
 
     from signface.channels.events import ChannelEvents
-    from signface.elan.options import EafOptions
     from signface.face.layout import MarkerLayout
     from signface.face.model import FaceModel
     from signface.label.model import Card, TrainedModel
     from signface.segmentation.segments import Segments
+    from signface.settings.eaf import EafOptions
+    from signface.settings.solve import SolveSettings
     from signface.takes.recording import Recording
 
 
@@ -151,23 +151,22 @@ def annotate(
     recording: Recording | Descriptors,
     model: TrainedModel,
     *,
+    settings: SolveSettings | None = None,
     signer: Signer | None = None,
     channels: bool | str | PathLike[str] | Mapping[str, Mapping[str, Any]] = False,
     face: FaceModel | None = None,
     layout: MarkerLayout | None = None,
-    neutral: str | float = "auto",
-    method: str = "thin-shell",
-    alpha: float | None = None,
-    **options: Any,
 ) -> Annotation:
     """Solve, segment and label one recording (Reverdy 2019, chapters 4 and 5).
 
     Parameters
     ----------
     recording : Take, TakeFile or Descriptors
-        What `signface.takes.reading.open_recording` returns; descriptors (weights from a phone) are not solved.
+        What `signface.takes.reading.open_recording` returns; descriptors are not solved again.
     model : TrainedModel
         What `signface.label.persistence.load_model` returns.
+    settings : SolveSettings, optional
+        How the recording is solved.
     signer : Signer, optional
         Whose take it is: names the tiers. A model that normalises signers does so by the signer's level, and by this
         take alone where none is known.
@@ -175,18 +174,8 @@ def annotate(
         Also find the further channels and, where the model gives no intensity, the intensity of the affect by its
         rule: True for the shipped thresholds, or a file of one's own, or what `signface.channels.rules.read_channels`
         returns.
-    face : FaceModel, optional
-        The face to solve for; the shipped one by default.
-    layout : MarkerLayout, optional
-        Where the markers stand on that face; by default the shipped layout that fits the take's labels.
-    neutral : float or "auto"
-        Time in seconds of a frame with a neutral face.
-    method : str
-        One of `signface.solver.methods.METHODS`.
-    alpha : float, optional
-        Weight of the thin shell, 0 to 1; the method's own default when not given.
-    **options
-        More of `signface.solver.solving.solve_take`.
+    face, layout : optional
+        In place of those that the settings name.
 
     Raises
     ------
@@ -207,8 +196,9 @@ def annotate(
     ['N', 'NJ', 'J']
     """
     from signface.label.labelling import find_segments
+    from signface.solver.solving import solve
 
-    descriptors = describe(recording, face=face, layout=layout, neutral=neutral, method=method, alpha=alpha, **options)
+    descriptors = solve(recording, face, layout, settings=settings, signer=signer)
     signer = Signer() if signer is None else signer
     segments = find_segments(descriptors, model, level=signer.level)
     events = None
@@ -222,56 +212,6 @@ def annotate(
         if "intensity" in thresholds and "intensity" not in segments.table:
             segments = find_intensities(descriptors, segments, thresholds)
     return Annotation(descriptors, segments, model.name, events, signer, model.card)
-
-
-def describe(
-    recording: Recording | Descriptors,
-    *,
-    face: FaceModel | None = None,
-    layout: MarkerLayout | None = None,
-    neutral: str | float = "auto",
-    method: str = "thin-shell",
-    alpha: float | None = None,
-    **options: Any,
-) -> Descriptors:
-    """Descriptors of a recording: solved from markers, or passed through when they came from a phone.
-
-    Parameters and errors are those of `annotate` and, for `options`, of `signface.solver.solving.solve_take`.
-    """
-    if isinstance(recording, Descriptors):
-        return recording
-    from signface.solver.solving import solve_take
-
-    face, layout = _face_and_layout(recording, face, layout)
-    return solve_take(recording, face, layout, neutral=neutral, method=method, alpha=alpha, **options)
-
-
-def describe_pieces(
-    recording: Recording | Descriptors,
-    *,
-    face: FaceModel | None = None,
-    layout: MarkerLayout | None = None,
-    **options: Any,
-) -> Iterator[Descriptors]:
-    """Descriptors of a recording of any length, piece by piece; see `describe` and `solving.solve_pieces`."""
-    if isinstance(recording, Descriptors):
-        yield recording
-        return
-    from signface.solver.solving import solve_pieces
-
-    face, layout = _face_and_layout(recording, face, layout)
-    yield from solve_pieces(recording, face, layout, **options)
-
-
-def _face_and_layout(
-    recording: Recording, face: FaceModel | None, layout: MarkerLayout | None
-) -> tuple[FaceModel, MarkerLayout]:
-    """The face and layout given, or the shipped ones."""
-    from signface.face.layout_files import choose_layout
-    from signface.face.reading import read_face
-
-    face = read_face("default") if face is None else face
-    return face, choose_layout(recording.labels, face) if layout is None else layout
 
 
 def median_known(values: np.ndarray) -> float | None:

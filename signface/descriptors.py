@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray
 
-    from signface.solve_settings import SolveSettings
+    from signface.settings.solve import SolveSettings
 
 
 @dataclass(frozen=True, eq=False)

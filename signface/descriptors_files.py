@@ -37,7 +37,7 @@ from signface.columns import (
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.files import whole_file
-from signface.solve_settings import SolveSettings
+from signface.settings.solve import SolveSettings
 
 if TYPE_CHECKING:
     import pyarrow as pa

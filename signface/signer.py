@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
@@ -78,6 +79,25 @@ class SignerBases(Content):
                 file=file,
                 hint="signface calibrate makes one",
             ) from error
+
+    @classmethod
+    def of(cls, bases: np.ndarray, learnt: Sequence[str], face: FaceModel, layout: MarkerLayout) -> SignerBases:
+        """Those of the (N, P, 3) bases at a layout's markers that were learnt: the others are the avatar's."""
+        rows = [
+            (name, marker, place)
+            for name in learnt
+            for marker, place in zip(layout.face_labels, bases[face.names.index(name)], strict=True)
+        ]
+        names, markers, places = zip(*rows, strict=True) if rows else ((), (), np.zeros((0, 3)))
+        return cls(names, markers, np.array(places))
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the bases as a csv, which `read` reads."""
+        with whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+            writer = csv.writer(stream)
+            writer.writerow(["base", "marker", "x", "y", "z"])
+            for base, marker, place in zip(self.bases, self.markers, self.displacements, strict=True):
+                writer.writerow([base, marker, *(f"{value:.5f}" for value in place)])
 
     def at(self, face: FaceModel, layout: MarkerLayout) -> np.ndarray:
         """(N, P, 3) bases at the markers of a layout; what is not known of the signer is the avatar's.
@@ -168,7 +188,7 @@ class Signer:
 
     See Also
     --------
-    signface.solve_settings.SolveSettings : how any signer is solved.
+    signface.settings.solve.SolveSettings : how any signer is solved.
 
     Examples
     --------
@@ -189,10 +209,18 @@ class Signer:
         return replace(self, level=signer_level(takes))
 
     @property
-    def digest(self) -> str:
-        """SHA-256 of what it says, but for the name and where it was read."""
-        content = {key: value for key, value in self._plain().items() if key != "name"}
-        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    def bases_digest(self) -> str:
+        """SHA-256 of the bases, wherever they were read; empty where there are none."""
+        return self._digest_of("bases")
+
+    @property
+    def level_digest(self) -> str:
+        """SHA-256 of the level; empty where there is none."""
+        return self._digest_of("level")
+
+    def _digest_of(self, part: str) -> str:
+        content = self._plain().get(part)
+        return "" if content is None else hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
     def _plain(self) -> dict[str, Any]:
         found: dict[str, Any] = {"name": self.name}
@@ -205,14 +233,17 @@ class Signer:
         return found
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Write the signer as JSON, which `read` reads to the last bit.
+        """Write the signer as JSON, which `read` reads to the last bit; or, as .csv, the bases alone.
 
         Raises
         ------
         SignfaceError
-            The ending is not .json, or the folder cannot be written.
+            The ending is neither, a .csv is to hold a signer without bases, or the folder cannot be written.
         """
         file = Path(path)
+        if file.suffix.lower() == ".csv" and self.bases is not None:
+            self.bases.save(file)
+            return file
         if file.suffix.lower() != ".json":
             raise SignfaceError("the ending of a signer's file is .json", file=file)
         with whole_file(file) as temporary:

@@ -19,7 +19,7 @@ from signface.descriptors import Descriptors
 from signface.descriptors_files import WeightsWriter, read_weights, write_weights
 from signface.elan.reference import read_tiers
 from signface.errors import SignfaceError
-from signface.solve_settings import SolveSettings
+from signface.settings.solve import SolveSettings
 from signface.takes.formats.c3d import write_c3d
 from signface.takes.reading import read_take
 

@@ -6,30 +6,30 @@ import argparse
 import contextlib
 import sys
 from collections.abc import Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from signface.cli.options import (
+    add_settings_arguments,
+    add_signer_arguments,
     add_solve_arguments,
-    add_writing_arguments,
     output_files,
     read_face_and_layout,
-    solve_options,
-    writing_options,
+    settings_from,
+    signer_from,
 )
 from signface.cli.threads import one_thread_for_matrices
 from signface.errors import SignfaceError
 from signface.progress import progress
+from signface.settings.eaf import EafOptions
+from signface.settings.solve import SolveSettings
 
 if TYPE_CHECKING:
     from signface.annotation import Annotation
     from signface.descriptors import Descriptors
-    from signface.elan.options import EafOptions
-    from signface.face.layout import MarkerLayout
     from signface.face.model import FaceModel
     from signface.label.model import TrainedModel
-    from signface.signer import SignerLevel
 
 EXAMPLE = """  signface annotate take.c3d -o take.eaf
   signface annotate recordings/*.c3d -o annotated/ --signer S1
@@ -51,7 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--into", type=Path, metavar="EAF", help="add our tiers to this .eaf, and touch nothing else in it"
     )
-    add_writing_arguments(parser)
+    add_settings_arguments(parser, EafOptions)
+    add_signer_arguments(parser)
     parser.add_argument(
         "--figure", action="store_true", help="also draw the face and the timeline of each take (TAKE.png)"
     )
@@ -63,6 +64,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Annotate every take; those that cannot be are named, and the others still are."""
     one_thread_for_matrices()
+    from signface.annotation import annotate
+    from signface.solver.solving import solve
+    from signface.takes.reading import open_recording
+
     takes = arguments.takes
     if arguments.video is not None and len(takes) > 1:
         raise SignfaceError("--video belongs to one take", hint="annotate the takes one by one")
@@ -70,42 +75,44 @@ def run(arguments: argparse.Namespace) -> int:
         raise SignfaceError("no such video", file=arguments.video)
     if arguments.into is not None and len(takes) > 1:
         raise SignfaceError("--into names one file", hint="annotate the takes one by one")
-    if arguments.into is not None and arguments.template is not None:
+    options = settings_from(arguments, EafOptions)
+    if arguments.into is not None and options.template is not None:
         raise SignfaceError("--into and --template exclude each other", hint="the file of --into has its own tiers")
     files = [arguments.into] if arguments.into is not None else output_files(takes, arguments.output, ".eaf")
-    options = writing_options(arguments)
-    _ = options.rules  # a mapping that is none is said before anything is solved
+    if options.mapping is not None:  # one that is none is said before anything is solved
+        from signface.elan.mapping import read_mapping
+
+        read_mapping(options.mapping)
     channels: bool | Mapping[str, Any] = False
     if options.channels is not None:  # pandas comes with it, which is otherwise imported beside the solve
         from signface.channels.rules import read_channels
 
         channels = read_channels(options.channels)
+    signer, settings = signer_from(arguments), settings_from(arguments, SolveSettings)
     _import_shared()
+    from signface.elan.writing import write_eaf
+
     failed = 0
     with ThreadPoolExecutor(1) as beside:
         model = beside.submit(_load_model, arguments.classifier)
-        face, layout = read_face_and_layout(arguments)
+        face, layout = read_face_and_layout(settings)
         known: dict[Path, Descriptors] = {}
-        level = None
-        if len(takes) > 1 and model.result().card.normalise == "signer":
-            from signface.signer import signer_level
-
-            known = _described(takes, arguments, face, layout)
-            level = signer_level(list(known.values())) if known else None
+        if len(takes) > 1 and signer.level is None and model.result().card.normalise == "signer":
+            for take in progress(takes, "solving"):
+                with contextlib.suppress(SignfaceError):  # said when its turn comes
+                    known[take] = solve(open_recording(take), face, layout, settings=settings, signer=signer)
+            signer = signer.with_level(list(known.values())) if known else signer
         for take, file in progress(list(zip(takes, files, strict=True)), "annotating"):
+            path, into = (file, None) if arguments.into is None else (None, file)
             try:
-                annotate_file(
-                    take,
-                    file,
-                    arguments,
-                    options,
-                    channels,
-                    face=face,
-                    layout=layout,
-                    model=model,
-                    solved=known.get(take),
-                    level=level,
+                descriptors = known.get(take) or solve(
+                    open_recording(take), face, layout, settings=settings, signer=signer
                 )
+                result = annotate(descriptors, model.result(), signer=signer, channels=channels)
+                write_eaf(result, path, into=into, options=options, video=arguments.video, replace=arguments.replace)
+                if arguments.figure:
+                    save_picture(result, face, file.with_suffix(".png"))
+                print(f"{file}: {result}")
             except SignfaceError as error:
                 if len(takes) == 1 or error is model.exception():
                     raise
@@ -132,57 +139,6 @@ def _load_model(name: str) -> TrainedModel:
     from signface.label.persistence import load_model
 
     return load_model(name, quickly=True)
-
-
-def _described(
-    takes: list[Path], arguments: argparse.Namespace, face: FaceModel, layout: MarkerLayout | None
-) -> dict[Path, Descriptors]:
-    """The takes of the signer solved, for a classifier that normalises by all of them; without those that fail."""
-    found = {}
-    for take in progress(takes, "solving"):
-        with contextlib.suppress(SignfaceError):  # said when its turn comes
-            found[take] = _describe(take, arguments, face, layout)
-    return found
-
-
-def _describe(take: Path, arguments: argparse.Namespace, face: FaceModel, layout: MarkerLayout | None) -> Descriptors:
-    from signface.annotation import describe
-    from signface.takes.reading import open_recording
-
-    return describe(
-        open_recording(take),
-        face=face,
-        layout=layout,
-        **solve_options(arguments),
-    )
-
-
-def annotate_file(
-    take: Path,
-    file: Path,
-    arguments: argparse.Namespace,
-    options: EafOptions,
-    channels: bool | Mapping[str, Any],
-    *,
-    face: FaceModel,
-    layout: MarkerLayout | None,
-    model: Future[TrainedModel],
-    solved: Descriptors | None = None,
-    level: SignerLevel | None = None,
-) -> None:
-    """Annotate one recording into one .eaf and say what was found."""
-    from signface.annotation import annotate
-    from signface.elan.writing import write_eaf
-    from signface.signer import Signer
-
-    descriptors = _describe(take, arguments, face, layout) if solved is None else solved
-    signer = Signer(arguments.signer, level=level)
-    annotation = annotate(descriptors, model.result(), signer=signer, channels=channels)
-    path, into = (file, None) if arguments.into is None else (None, file)
-    write_eaf(annotation, path, into=into, options=options, video=arguments.video, replace=arguments.replace)
-    if arguments.figure:
-        save_picture(annotation, face, file.with_suffix(".png"))
-    print(f"{file}: {annotation}")
 
 
 def save_picture(annotation: Annotation, face: FaceModel, path: Path) -> None:

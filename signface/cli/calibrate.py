@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from signface.cli.options import add_face_arguments, add_neutral_argument, read_face_and_layout
+from signface.cli.options import add_solve_arguments, settings_from
 from signface.errors import SignfaceError
+from signface.settings.solve import SolveSettings
 
 EXAMPLE = """  signface calibrate range-of-motion.c3d shown.csv -o signer.csv
   signface solve take.c3d --signer-bases signer.csv -o weights.csv
@@ -25,10 +26,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "shown", type=Path, metavar="SHOWN", help="a .csv: start_s, end_s, bases (joined by +, * for Left and Right)"
     )
     parser.add_argument(
-        "-o", "--output", type=Path, required=True, metavar="FILE", help="the signer's bases, for --signer-bases (.csv)"
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="the signer's bases, for --signer-file (.csv, .json)",
     )
-    add_face_arguments(parser)
-    add_neutral_argument(parser)
+    parser.add_argument("--signer", default="", metavar="NAME", help="who it is; kept in a .json")
+    add_solve_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -36,26 +42,27 @@ def run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from signface.descriptors import Descriptors
-    from signface.face.layout_files import choose_layout
-    from signface.solver.range_of_motion import calibrate_shown, read_shown, write_signer
-    from signface.solver.solving import prepare_take
+    from signface.signer import Signer, SignerBases
+    from signface.solver.range_of_motion import calibrate_shown, read_shown
+    from signface.solver.solving import face_and_layout, prepare_take
     from signface.takes.reading import open_recording
 
-    if arguments.output.suffix.lower() != ".csv":
-        raise SignfaceError("a signer's bases are written as .csv", file=arguments.output)
+    if arguments.output.suffix.lower() not in (".csv", ".json"):
+        raise SignfaceError("a signer's bases are written as .csv, a signer as .json", file=arguments.output)
     recording = open_recording(arguments.take)
     if isinstance(recording, Descriptors):
         raise SignfaceError("holds weights, not markers", file=arguments.take)
-    face, layout = read_face_and_layout(arguments)
+    settings = settings_from(arguments, SolveSettings)
+    face, layout = face_and_layout(recording.labels, settings)
     shown = read_shown(arguments.shown, face.names)
-    layout = choose_layout(recording.labels, face) if layout is None else layout
-    prepared = prepare_take(recording, face, layout, neutral=arguments.neutral)
+    prepared = prepare_take(recording, face, layout, settings=settings.changed(creep=bool(settings.creep)))
     bases, learnt = calibrate_shown(
         prepared.displacements, shown, face, prepared.layout, rate=recording.rate, start_s=recording.start
     )
-    write_signer(bases, learnt, face, prepared.layout, arguments.output)
-    own = [face.names.index(name) for name in learnt]
-    avatar = prepared.layout.bases(face)[own]
-    apart = float(np.sqrt(((bases[own] - avatar) ** 2).sum() / (avatar**2).sum()))
+    signer = Signer(arguments.signer, SignerBases.of(bases, learnt, face, prepared.layout))
+    signer.save(arguments.output)
+    columns = [face.names.index(name) for name in learnt]
+    avatar = prepared.layout.bases(face)[columns]
+    apart = float(np.sqrt(((bases[columns] - avatar) ** 2).sum() / (avatar**2).sum()))
     print(f"{arguments.output}: {len(learnt)} of {face.n_bases} bases, {apart:.0%} away from the avatar's")
     return 0

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import argparse
 import sys
+from functools import partial
 from pathlib import Path
 
-from signface.cli.options import add_face_arguments, add_writing_arguments, writing_options
+from signface.cli.options import add_settings_arguments, add_solve_arguments, settings_from
 from signface.errors import SignfaceError
 from signface.progress import progress
+from signface.settings.eaf import EafOptions
+from signface.settings.solve import SolveSettings
 
 EXAMPLE = """  signface corpus check corpora/feel
   signface corpus run corpora/feel
@@ -25,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     check = actions.add_parser("check", help="find every problem of a corpus at once")
     _add_corpus(check)
     _add_workers(check)
-    add_face_arguments(check)
+    add_solve_arguments(check)
 
     run_ = actions.add_parser("run", help="solve and annotate every take; goes on where it was stopped")
     _add_corpus(run_)
@@ -36,13 +39,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     run_.add_argument(
         "--scheduler", metavar="ADDRESS", help="run on a Dask cluster that sees the same files (tcp://HOST:8786)"
     )
-    add_face_arguments(run_)
-    run_.add_argument("--method", default="thin-shell", help="how weights are solved (default: %(default)s)")
-    run_.add_argument("--alpha", type=float, metavar="A", help="weight of the thin shell, 0 to 1")
+    add_solve_arguments(run_)
     run_.add_argument(
         "--classifier", default="default", metavar="NAME_OR_FILE", help="a shipped classifier or a .skops file"
     )
-    add_writing_arguments(run_)
+    add_settings_arguments(run_, EafOptions)
+
+    signers = actions.add_parser(
+        "signers", help="learn where each signer's face rests, from all of their takes: CORPUS/signers/NAME.json"
+    )
+    _add_corpus(signers)
+    signers.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="default: CORPUS/signers")
+    add_solve_arguments(signers)
 
     info = actions.add_parser("info", help="what is in a corpus and in its store, and how to open it")
     _add_corpus(info)
@@ -70,7 +78,7 @@ def _count(text: str) -> int:
 
 def run(arguments: argparse.Namespace) -> int:
     """Do what was asked for."""
-    return {"check": check, "run": run_all, "info": info, "query": query}[arguments.action](arguments)
+    return {"check": check, "run": run_all, "signers": learn, "info": info, "query": query}[arguments.action](arguments)
 
 
 def check(arguments: argparse.Namespace) -> int:
@@ -79,8 +87,7 @@ def check(arguments: argparse.Namespace) -> int:
 
     found = check_corpus(
         arguments.corpus,
-        face=arguments.face,
-        layout=arguments.layout,
+        settings=settings_from(arguments, SolveSettings),
         workers=arguments.workers,
         progress=lambda items, total: progress(items, "checking", total=total),
     )
@@ -101,14 +108,11 @@ def run_all(arguments: argparse.Namespace) -> int:
     outcomes = run_corpus(
         corpus,
         output=output,
-        face=arguments.face,
-        layout=arguments.layout,
-        method=arguments.method,
-        alpha=arguments.alpha,
+        settings=settings_from(arguments, SolveSettings),
         classifier=arguments.classifier,
         workers=arguments.workers,
         scheduler=arguments.scheduler,
-        options=writing_options(arguments),
+        options=settings_from(arguments, EafOptions),
     )
     count = dict.fromkeys((DONE, BEFORE, CORRECTED, FAILED), 0)
     solved = 0
@@ -130,6 +134,22 @@ def run_all(arguments: argparse.Namespace) -> int:
     for outcome in sorted(wrong, key=lambda outcome: outcome.take):
         print(f"signface: {outcome.message}", file=sys.stderr)
     return 2 if wrong else 0
+
+
+def learn(arguments: argparse.Namespace) -> int:
+    """Write what is known of each signer, with the level of all of their takes."""
+    from signface.corpus.levels import learn_signers
+    from signface.corpus.manifest import read_corpus
+    from signface.corpus.signers import SIGNERS
+
+    corpus = read_corpus(arguments.corpus)
+    output = arguments.output or corpus.folder / SIGNERS
+    takes = partial(progress, what="solving", total=len(corpus))
+    for signer in learn_signers(corpus, settings_from(arguments, SolveSettings), progress=takes):
+        file = signer.save(output / f"{signer.name}.json")
+        bases = "the avatar's bases" if signer.bases is None else f"{len(set(signer.bases.bases))} bases of their own"
+        print(f"{file}: {bases}, level of all takes")
+    return 0
 
 
 def info(arguments: argparse.Namespace) -> int:

@@ -27,6 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     from signface.files import bundled_corpus
     from signface.label.persistence import load_model
     from signface.progress import progress
+    from signface.settings.solve import SolveSettings
     from signface.signer import Signer
     from signface.takes.reading import read_recording
 
@@ -40,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
             model,
             signer=Signer(entry.signer),
             face=face,
-            neutral="auto" if entry.neutral_s is None else entry.neutral_s,
+            settings=SolveSettings() if entry.neutral_s is None else SolveSettings(neutral=entry.neutral_s),
         )
         written = write_eaf(annotation, file, replace=True)
         save_picture(annotation, face, file.with_suffix(".png"))

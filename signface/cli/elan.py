@@ -7,8 +7,10 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from signface.cli.options import add_solve_arguments, settings_from
 from signface.errors import SignfaceError
 from signface.progress import progress
+from signface.settings.solve import SolveSettings
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -60,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="train on this corpus as well; may be repeated",
     )  # fmt: skip
     learn.add_argument("--seed", type=int, default=0, help="default: %(default)s")
+    add_solve_arguments(learn)
 
     agree = action(
         "agree",
@@ -163,15 +166,16 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
 
     from signface.label.persistence import load_model, save_model
     from signface.learn.relearning import held_out_labels
-    from signface.learn.settings import TrainingSettings
     from signface.learn.training import train_model
+    from signface.settings.training import TrainingSettings
 
     def solved(folder: Path) -> list:
         own = read_corpus(folder)
         count = sum(entry.annotation is not None for entry in own)
-        return solve_examples(own, progress=lambda items: progress(items, "solving", total=count))
+        return solve_examples(own, settings=solve, progress=lambda items: progress(items, "solving", total=count))
 
     settings = TrainingSettings(classifier=arguments.classifier, seed=arguments.seed, calibrate=False)
+    solve = settings_from(arguments, SolveSettings)
     before = load_model(arguments.before)
     corrected = solved(arguments.corpus)
     known_names = {example.take.rpartition("/")[2] for example in corrected}
@@ -195,8 +199,7 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
     model = train_model(
         [*corrected, *others],
         settings,
-        face="default",
-        layout="chosen by markers",
+        solve=solve,
         corpus=" + ".join(folder.resolve().name for folder in (arguments.corpus, *arguments.others)),
         scores=scores,
         name=arguments.output.stem,
@@ -272,12 +275,10 @@ def recognise(arguments: argparse.Namespace) -> int:
 
 def _recognise(xml: bytes) -> None:
     from signface.annotation import annotate
-    from signface.cli.options import neutral_time
     from signface.elan.recogniser import progress_line, read_parameters, write_tier_file
     from signface.elan.tiers import affect_tier
-    from signface.face.layout_files import read_layout
-    from signface.face.reading import read_face
     from signface.label.persistence import load_model
+    from signface.settings.laboratory import read_settings
     from signface.signer import Signer
     from signface.takes.reading import read_recording
 
@@ -285,18 +286,16 @@ def _recognise(xml: bytes) -> None:
     for name, what in (("take", "recording"), ("tiers", "file for the tiers")):
         if name not in chosen:
             raise SignfaceError(f"no {what} was chosen", hint=f"choose it in the panel ({name})")
-    try:
-        neutral = neutral_time(chosen.get("neutral", "auto"))
-    except argparse.ArgumentTypeError as error:
-        raise SignfaceError(str(error), hint="write seconds, or auto") from error
+    settings = read_settings(chosen["settings"]).solve if "settings" in chosen else SolveSettings()
+    given = {name: chosen[name] for name in ("face", "layout", "neutral") if chosen.get(name)}
+    settings = settings.changed(**given)
+    name = chosen.get("signer", "")
+    signer = Signer.read(chosen["signer_file"], name=name or None) if "signer_file" in chosen else Signer(name)
     print(progress_line(0.05, "reading"), flush=True)
     recording = read_recording(Path(chosen["take"]))
-    face = read_face(chosen.get("face", "default"))
-    layout = read_layout(chosen["layout"], face) if "layout" in chosen else None
     model = load_model(chosen.get("classifier", "default"), quickly=True)
     print(progress_line(0.2, "solving"), flush=True)
-    signer = Signer(chosen.get("signer", ""))
-    annotation = annotate(recording, model, signer=signer, face=face, layout=layout, neutral=neutral)
+    annotation = annotate(recording, model, settings=settings, signer=signer)
     print(progress_line(0.9, "writing"), flush=True)
     tier = affect_tier(annotation.segments, annotation.signer.name)
     write_tier_file(chosen["tiers"], tier, with_dependents=("affect-confidence",))

@@ -5,11 +5,12 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from signface.cli.options import add_face_arguments
-from signface.cli.train import add_training_arguments, training_settings, words
+from signface.cli.options import add_solve_arguments, settings_from, words
+from signface.cli.train import add_training_arguments, training_settings
 from signface.errors import SignfaceError
-from signface.label.labellers import NAMES, SEQUENCE_NAMES
 from signface.progress import progress
+from signface.settings.choices import NAMES, SEQUENCE_NAMES
+from signface.settings.solve import SolveSettings
 
 EXAMPLE = """  signface evaluate corpora/feel -o reports/feel
   signface evaluate corpora/feel -o reports/feel --train-kinds IE,SE,EU --protocol across --classifiers net-hsmm"""
@@ -69,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--date", metavar="WORDS", help="date to print on the report (default: none, so that its bytes repeat)"
     )
     parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")
-    add_face_arguments(parser)
+    add_solve_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -89,14 +90,14 @@ def run(arguments: argparse.Namespace) -> None:
             hint=f"choose among {', '.join(NAMES | SEQUENCE_NAMES)}",
         )
     settings = training_settings(arguments)
+    solve = settings_from(arguments, SolveSettings)
     if arguments.output.exists() and not arguments.output.is_dir():
         raise SignfaceError("is a file, not a folder", file=arguments.output, hint="name a folder for the report")
     whole = read_corpus(arguments.corpus)
     corpus = whole.select(kinds=[*arguments.train_kinds, *arguments.test_kinds])
     examples = solve_examples(
         corpus,
-        face=arguments.face,
-        layout=arguments.layout,
+        settings=solve,
         progress=lambda items: progress(items, "solving", total=sum(t.annotation is not None for t in corpus)),
     )
     metrics, segments = measure(
@@ -109,9 +110,9 @@ def run(arguments: argparse.Namespace) -> None:
         curves_of=arguments.classifiers if arguments.learning_curve else None,
         progress=progress,
     )
-    facts = corpus_facts(corpus, face=arguments.face, layout=arguments.layout)
+    facts = corpus_facts(corpus, settings=solve)
     metrics["corpus"] = facts
-    face = read_face(arguments.face) if facts["faces"] else None
+    face = read_face(solve.face) if facts["faces"] else None
     page = write_report(Evaluated(metrics, facts, examples, segments, face, arguments.date), arguments.output)
     print_results(metrics)
     print(f"report: {page}")

@@ -10,10 +10,11 @@ import argparse
 import importlib
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 
 from signface.compiling import on_compiling
-from signface.errors import SignfaceError
+from signface.errors import SignfaceError, SignfaceWarning
 
 #: command: what it does, in a line. The module has the same name.
 COMMANDS = {
@@ -75,6 +76,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if arguments.command is None:
         parser.print_help()
         return 0
+    warnings.showwarning = _say_warning
     on_compiling(_say_why_it_takes_long)
     try:
         return arguments.run(arguments) or 0
@@ -87,6 +89,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # `signface ... | head` is no defect
         return 0
+
+
+def _say_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: object = None,
+    line: object = None,
+) -> None:
+    """Warnings of ours as a line each; those of packages are for programmers."""
+    if issubclass(category, SignfaceWarning):
+        print(f"signface: note: {message}", file=sys.stderr, flush=True)
 
 
 def _say_why_it_takes_long(once: bool) -> None:

@@ -3,117 +3,28 @@
 from __future__ import annotations
 
 import argparse
+import json
+from collections.abc import Collection, Mapping
+from dataclasses import MISSING, Field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from signface.errors import SignfaceError
+from signface.settings.base import Settings
+from signface.settings.solve import SolveSettings
 
 if TYPE_CHECKING:
-    from signface.elan.options import EafOptions
     from signface.face.layout import MarkerLayout
     from signface.face.model import FaceModel
+    from signface.signer import Signer
 
 
-def add_face_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add `--face` and `--layout`."""
-    parser.add_argument(
-        "--face",
-        default="default",
-        metavar="FACE",
-        help="a shipped face or a file (.glb, .wfm) or folder of .obj (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--layout",
-        metavar="LAYOUT",
-        help="a shipped layout or a .csv (default: the shipped layout that fits the markers best)",
-    )
+Decision = TypeVar("Decision", bound=Settings)
 
 
-def add_neutral_argument(parser: argparse.ArgumentParser) -> None:
-    """Add `--neutral`."""
-    parser.add_argument(
-        "--neutral",
-        default="auto",
-        type=neutral_time,
-        metavar="SECONDS",
-        help="time of a frame with a neutral face, or auto (default: %(default)s)",
-    )
-
-
-def add_solve_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add `--face`, `--layout`, `--neutral`, and how markers become weights; see `solve_options`."""
-    add_face_arguments(parser)
-    add_neutral_argument(parser)
-    parser.add_argument("--method", default="thin-shell", help="how weights are solved (default: %(default)s)")
-    parser.add_argument(
-        "--alpha", type=float, metavar="A", help="weight of the thin shell, 0 to 1 (default: the method's own)"
-    )
-    how = parser.add_argument_group("fine points of the solve (docs/solver.md)")
-    how.add_argument(
-        "--adaptation",
-        choices=("similarity", "rbf"),
-        default="similarity",
-        help="how displacements are carried to the avatar (default: %(default)s)",
-    )
-    how.add_argument("--sparsity", type=float, metavar="S", help="pull towards rest, 0 or more (default: 0.006)")
-    how.add_argument(
-        "--head-slack", type=float, metavar="H", help="how far head markers may creep, 0 trusts them (default: 0.3)"
-    )
-    how.add_argument(
-        "--slip",
-        type=float,
-        metavar="D",
-        help="how far off a marker counts in full, beside a typical displacement; 0 trusts all (default: 0.4)",
-    )
-    how.add_argument("--keep-creep", action="store_true", help="do not take away what the markers creep on the skin")
-    how.add_argument(
-        "--signer-bases", type=Path, metavar="FILE", help="the signer's own bases, made by signface calibrate"
-    )
-
-
-def add_writing_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add `--template`, `--mapping`, `--channels` and `--doubtful`."""
-    parser.add_argument(
-        "--template", type=Path, metavar="ETF_OR_EAF", help="a lab's template, whose tiers and vocabularies are used"
-    )
-    parser.add_argument(
-        "--mapping", type=Path, metavar="FILE", help="which channel goes to which tier (signface elan map writes one)"
-    )
-    parser.add_argument(
-        "--channels",
-        nargs="?",
-        const="default",
-        metavar="FILE",
-        help="also brows, eyes, gaze, nose, mouth, cheeks, head and intensity; FILE holds other thresholds",
-    )
-    parser.add_argument(
-        "--doubtful",
-        type=float,
-        metavar="CONFIDENCE",
-        help="also a tier with the segments whose confidence is below this, 0 to 1",
-    )
-
-
-def writing_options(arguments: argparse.Namespace) -> EafOptions:
-    """What `add_writing_arguments` asked for."""
-    from signface.elan.options import EafOptions
-
-    return EafOptions(arguments.template, arguments.mapping, arguments.channels, arguments.doubtful)
-
-
-def solve_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """What `add_solve_arguments` asked for, as keywords of `signface.solver.solving.solve_take`."""
-    return {
-        "neutral": arguments.neutral,
-        "method": arguments.method,
-        "alpha": arguments.alpha,
-        "adaptation": arguments.adaptation,
-        "sparsity": arguments.sparsity,
-        "head_slack": arguments.head_slack,
-        "slip": arguments.slip,
-        "creep": False if arguments.keep_creep else None,
-        "signer": arguments.signer_bases,
-    }
+def words(text: str) -> list[str]:
+    """The words of a list with commas; for argparse."""
+    return [word.strip() for word in text.split(",") if word.strip()]
 
 
 def neutral_time(text: str) -> float | str:
@@ -126,13 +37,130 @@ def neutral_time(text: str) -> float | str:
         raise argparse.ArgumentTypeError(f"{text!r} is neither a time in seconds nor auto") from None
 
 
-def read_face_and_layout(arguments: argparse.Namespace) -> tuple[FaceModel, MarkerLayout | None]:
-    """The face and layout that were asked for; no layout stands for the one that fits the take best."""
+def parameters(text: str) -> dict[str, Any]:
+    """`NAME=VALUE,...` with numbers, true and false as such; for argparse."""
+    values: dict[str, Any] = {}
+    for word in words(text):
+        name, sign, value = word.partition("=")
+        if not sign:
+            raise argparse.ArgumentTypeError(f"{word!r} is not NAME=VALUE")
+        try:
+            values[name.strip()] = json.loads(value)
+        except ValueError:
+            values[name.strip()] = value.strip()
+    return values
+
+
+#: What a word on the command line becomes, by the kind of a setting.
+READERS: dict[Any, Any] = {float: float, int: int, tuple: words, Mapping: parameters, object: neutral_time, str: str}
+
+
+def add_settings_arguments(
+    parser: argparse.ArgumentParser, kind: type[Settings], *, without: Collection[str] = (), title: str | None = None
+) -> None:
+    """Add every field of a `Settings` as an option, and `--settings` for a laboratory's TOML; see `settings_from`.
+
+    Parameters
+    ----------
+    parser : ArgumentParser
+    kind : type of Settings
+    without : collection of str
+        Fields that make no sense for this command.
+    title : str, optional
+        Heading of a group of their own in the help.
+    """
+    if "--settings" not in parser._option_string_actions:
+        parser.add_argument(
+            "--settings",
+            type=Path,
+            metavar="TOML",
+            help="a laboratory's settings: [solve], [train], [eaf]",
+        )
+    group = parser if title is None else parser.add_argument_group(title)
+    for item in fields(kind):  # type: ignore[arg-type]
+        if item.name in without:
+            continue
+        about = item.metadata
+        flag = about["flag"] or f"--{item.name.replace('_', '-')}"
+        common: dict[str, Any] = {"dest": f"{kind.TABLE}_{item.name}", "default": argparse.SUPPRESS}
+        common["help"] = about["help"] + _default_words(item)
+        if about["kind"] is bool:
+            if flag.startswith("--keep-"):
+                group.add_argument(flag, action="store_const", const=False, **common)
+            else:
+                group.add_argument(flag, action=argparse.BooleanOptionalAction, **common)
+        elif about["bare"] is not None:
+            group.add_argument(flag, nargs="?", const=about["bare"], metavar=about["metavar"], **common)
+        else:
+            # Where a metavar stands for many choices, the settings say what is close to a wrong one.
+            common |= {"metavar": about["metavar"]} if about["metavar"] else {"choices": about["choices"] or None}
+            group.add_argument(flag, type=READERS[about["kind"]], **common)
+
+
+def _default_words(item: Field[Any]) -> str:
+    default = item.default
+    if "(default" in item.metadata["help"] or default is None or default is MISSING or isinstance(default, bool):
+        return ""
+    return f" (default: {','.join(default) if isinstance(default, tuple) else default})"
+
+
+def settings_from(arguments: argparse.Namespace, kind: type[Decision]) -> Decision:
+    """The settings that the command line asked for: its options over the laboratory's TOML over the defaults.
+
+    Raises
+    ------
+    SignfaceError
+        The TOML is missing or wrong, or a value is outside its range.
+    """
+    chosen = {
+        name.removeprefix(f"{kind.TABLE}_"): value
+        for name, value in vars(arguments).items()
+        if name.startswith(f"{kind.TABLE}_")
+    }
+    if getattr(arguments, "settings", None) is None:
+        return kind(**chosen)
+    from signface.settings.laboratory import read_settings
+
+    base: Any = getattr(read_settings(arguments.settings), kind.TABLE)
+    return base.changed(**chosen)
+
+
+def add_solve_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add how markers become weights, in two groups; see `settings_from`."""
+    plain = ("face", "layout", "neutral", "method", "alpha")
+    fine = [item.name for item in fields(SolveSettings) if item.name not in plain]
+    add_settings_arguments(parser, SolveSettings, without=fine)
+    add_settings_arguments(parser, SolveSettings, without=plain, title="fine points of the solve (docs/solver.md)")
+
+
+def add_signer_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add `--signer-file`; see `signer_from`."""
+    parser.add_argument(
+        "--signer-file",
+        "--signer-bases",
+        type=Path,
+        metavar="FILE",
+        help="what is known of the signer: made by signface calibrate (.csv, .json) or signface corpus signers (.json)",
+    )
+
+
+def signer_from(arguments: argparse.Namespace) -> Signer:
+    """The signer that the command line names: `--signer-file`, called `--signer` where the command has that."""
+    from signface.signer import Signer
+
+    name = getattr(arguments, "signer", None) or None
+    if arguments.signer_file is None:
+        return Signer(name or "")
+    return Signer.read(arguments.signer_file, name=name)
+
+
+def read_face_and_layout(settings: SolveSettings) -> tuple[FaceModel, MarkerLayout | None]:
+    """The face and layout that the settings name; no layout stands for the one that fits the take best."""
     from signface.face.layout_files import read_layout
     from signface.face.reading import read_face
 
-    face = read_face(arguments.face)
-    return face, None if arguments.layout is None else read_layout(arguments.layout, face)
+    face = read_face(settings.face)
+    return face, None if settings.layout is None else read_layout(settings.layout, face)
 
 
 def output_files(takes: list[Path], output: Path | None, suffix: str) -> list[Path]:

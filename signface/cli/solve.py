@@ -8,10 +8,18 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from signface.cli.options import add_solve_arguments, output_files, read_face_and_layout, solve_options
+from signface.cli.options import (
+    add_signer_arguments,
+    add_solve_arguments,
+    output_files,
+    read_face_and_layout,
+    settings_from,
+    signer_from,
+)
 from signface.cli.threads import one_thread_for_matrices
 from signface.errors import SignfaceError
 from signface.progress import progress
+from signface.settings.solve import SolveSettings
 
 EXAMPLE = """  signface solve take.c3d -o weights.csv
   signface solve recordings/*.c3d -o weights/ --format parquet"""
@@ -32,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="also write the weights' standard deviations, beside the weights: NAME.sd.csv or NAME.sd.parquet",
     )
     add_solve_arguments(parser)
+    add_signer_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -39,8 +48,9 @@ def run(arguments: argparse.Namespace) -> int:
     one_thread_for_matrices()
     import numpy as np
 
-    from signface.annotation import describe_pieces, median_known
+    from signface.annotation import median_known
     from signface.descriptors_files import WeightsWriter
+    from signface.solver.solving import solve_pieces
     from signface.takes.reading import open_recording
 
     ending = arguments.output.suffix.lower()
@@ -48,7 +58,8 @@ def run(arguments: argparse.Namespace) -> int:
     if ending and ending not in (".csv", ".parquet") and not arguments.output.is_dir() and len(arguments.takes) == 1:
         raise SignfaceError("the ending of a weights file is .csv or .parquet", file=arguments.output)
     files = output_files(arguments.takes, arguments.output, suffix)
-    face, layout = read_face_and_layout(arguments)
+    settings, signer = settings_from(arguments, SolveSettings), signer_from(arguments)
+    face, layout = read_face_and_layout(settings)
     failed = 0
     for take, file in progress(list(zip(arguments.takes, files, strict=True)), "solving"):
         try:
@@ -60,11 +71,12 @@ def run(arguments: argparse.Namespace) -> int:
                     if arguments.uncertainty
                     else None
                 )
-                for piece in describe_pieces(
+                for piece in solve_pieces(
                     open_recording(take),
-                    face=face,
-                    layout=layout,
-                    **solve_options(arguments),
+                    face,
+                    layout,
+                    settings=settings,
+                    signer=signer,
                     uncertainty=arguments.uncertainty,
                     progress=progress,
                 ):

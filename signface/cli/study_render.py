@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from signface.errors import SignfaceError
+from signface.settings.solve import SolveSettings
 
 if TYPE_CHECKING:
     import numpy as np
@@ -24,7 +25,7 @@ EXAMPLE = """  signface study render my-study
 
 def add_render_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of `render`."""
-    from signface.cli.options import add_face_arguments, neutral_time
+    from signface.cli.options import add_settings_arguments, add_signer_arguments
 
     parser.add_argument(
         "sources", nargs="+", type=Path, metavar="STUDY_OR_TAKE", help="a study's folder; or takes and weights files"
@@ -54,10 +55,8 @@ def add_render_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--markers", action="store_true", help="draw the layout's markers on the skin")
     parser.add_argument("--wireframe", action="store_true", help="draw the edges of the triangles")
-    parser.add_argument(
-        "--neutral", default="auto", type=neutral_time, metavar="SECONDS", help="time of a neutral face"
-    )
-    add_face_arguments(parser)
+    add_settings_arguments(parser, SolveSettings, without=("method", "alpha"))
+    add_signer_arguments(parser)
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -70,7 +69,7 @@ def _size(text: str) -> tuple[int, int]:
 def run_render(arguments: argparse.Namespace) -> None:
     """Render a study, or each of the files."""
     if len(arguments.sources) == 1 and (arguments.sources[0] / "study.toml").is_file():
-        _render_study(arguments.sources[0])
+        _render_study(arguments.sources[0], arguments)
         return
     folders = [source for source in arguments.sources if source.is_dir()]
     if folders:
@@ -83,7 +82,8 @@ def run_render(arguments: argparse.Namespace) -> None:
         _render_file(source, arguments)
 
 
-def _render_study(folder: Path) -> None:
+def _render_study(folder: Path, arguments: argparse.Namespace) -> None:
+    from signface.cli.options import settings_from, signer_from
     from signface.progress import progress
     from signface.study.design import read_study
     from signface.study.films.stimuli import make_synthetic_takes, plan_films, render_study
@@ -94,12 +94,13 @@ def _render_study(folder: Path) -> None:
         make_synthetic_takes(place, signer, show=lambda jobs: progress(jobs, "making synthetic takes"))
 
     films = plan_films(study, takes_made=make_takes)
-    count = render_study(films, show=lambda plans: progress(plans, "rendering films"))
+    settings, signer = settings_from(arguments, SolveSettings), signer_from(arguments)
+    count = render_study(films, settings=settings, signer=signer, show=lambda plans: progress(plans, "rendering films"))
     print(f"{folder}: {count} films; now signface study serve {folder}")
 
 
 def _render_file(source: Path, arguments: argparse.Namespace) -> None:
-    from signface.cli.options import read_face_and_layout
+    from signface.cli.options import read_face_and_layout, settings_from, signer_from, words
     from signface.face.layout_files import choose_layout
     from signface.render.film import Avatar
     from signface.render.raster import Style
@@ -107,12 +108,13 @@ def _render_file(source: Path, arguments: argparse.Namespace) -> None:
     from signface.takes.reading import read_recording
     from signface.takes.take import Take
 
-    methods = [parse_method(name.strip()) for name in arguments.methods.split(",") if name.strip()]
-    face, layout = read_face_and_layout(arguments)
+    settings = settings_from(arguments, SolveSettings)
+    methods = {name: parse_method(name, settings) for name in words(arguments.methods)}
+    face, layout = read_face_and_layout(settings)
     recording = read_recording(source)
     if isinstance(recording, Take):
         layout = layout or choose_layout(recording.labels, face)
-        shown = solve_methods(recording, face, layout, methods, neutral=arguments.neutral)
+        shown = solve_methods(recording, face, layout, methods, signer=signer_from(arguments))
     else:
         _check_bases(recording, face)
         layout = layout or (_default_layout(face) if arguments.markers else None)

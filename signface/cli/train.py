@@ -7,22 +7,18 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from signface.cli.options import add_face_arguments
+from signface.cli.options import add_solve_arguments, settings_from, words
 from signface.errors import SignfaceError
-from signface.label.labellers import NAMES, SEQUENCE_NAMES
 from signface.progress import progress
+from signface.settings.choices import NAMES, SEQUENCE_NAMES
+from signface.settings.solve import SolveSettings
 
 if TYPE_CHECKING:
-    from signface.learn.settings import TrainingSettings
+    from signface.settings.training import TrainingSettings
 
 EXAMPLE = """  signface train corpora/feel -o mine.skops
   signface train corpora/feel -o mine.skops --classifier svm-rbf --kinds IE,SE --signer each
   signface train corpora/feel -o mine.skops --normalise signer --features weights,windows --search"""
-
-
-def words(text: str) -> list[str]:
-    """The words of a list with commas; for argparse."""
-    return [word.strip() for word in text.split(",") if word.strip()]
 
 
 def add_training_arguments(parser: argparse.ArgumentParser) -> None:
@@ -54,7 +50,7 @@ def add_training_arguments(parser: argparse.ArgumentParser) -> None:
 
 def training_settings(arguments: argparse.Namespace) -> TrainingSettings:
     """The settings that a command was given, of `add_training_arguments`, `--classifier`, `--calibrate`, `--seed`."""
-    from signface.learn.settings import TrainingSettings
+    from signface.settings.training import TrainingSettings
 
     names = [item.name for item in fields(TrainingSettings) if hasattr(arguments, item.name)]
     return TrainingSettings(**{name: getattr(arguments, name) for name in names})
@@ -80,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="train on parts of the takes too, to score the rest and to calibrate confidences (default: yes)",
     )
     parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")
-    add_face_arguments(parser)
+    add_solve_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -93,7 +89,7 @@ def run(arguments: argparse.Namespace) -> None:
     output = arguments.output
     if output.suffix.lower() != ".skops":
         raise SignfaceError("the ending of a classifier is .skops", file=output)
-    settings = training_settings(arguments)
+    settings, solve = training_settings(arguments), settings_from(arguments, SolveSettings)
     whole = read_corpus(arguments.corpus)
     one = None if arguments.signer in ("all", "each") else [arguments.signer]
     corpus = whole.select(kinds=arguments.kinds, signers=one)
@@ -106,8 +102,7 @@ def run(arguments: argparse.Namespace) -> None:
     annotated = sum(take.annotation is not None for take in corpus)
     examples = solve_examples(
         corpus,
-        face=arguments.face,
-        layout=arguments.layout,
+        settings=solve,
         progress=lambda items: progress(items, "solving", total=annotated),
     )
     groups = {output: examples}
@@ -120,8 +115,7 @@ def run(arguments: argparse.Namespace) -> None:
         model = train_model(
             group,
             settings,
-            face=Path(arguments.face).name,
-            layout="chosen by markers" if arguments.layout is None else Path(arguments.layout).name,
+            solve=solve,
             corpus=whole.folder.resolve().name,
             name=file.stem,
         )

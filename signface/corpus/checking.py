@@ -22,6 +22,7 @@ from signface.corpus.manifest import MANIFEST, TakeEntry, read_rows
 from signface.corpus.origin import Recipe, content_digest, make_recipe, take_name
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
+from signface.settings.solve import SolveSettings
 
 if TYPE_CHECKING:
     from signface.takes.take import Take
@@ -74,8 +75,7 @@ class CheckedTake:
 def check_corpus(
     path: str | PathLike[str],
     *,
-    face: str = "default",
-    layout: str | None = None,
+    settings: SolveSettings | None = None,
     workers: int | None = None,
     progress: Callable[[Iterable, int], Iterable] = lambda items, total: items,
 ) -> CheckedCorpus:
@@ -92,7 +92,7 @@ def check_corpus(
     ----------
     path : path
         The folder of the corpus or its `takes.csv`.
-    face, layout : str, optional
+    settings : SolveSettings, optional
         As in `signface.corpus.running.run_corpus`.
     workers : int, optional
         Takes looked at at the same time; one for each core by default.
@@ -116,7 +116,7 @@ def check_corpus(
         file = file / MANIFEST
         if not file.is_file():
             raise SignfaceError(f"has no {MANIFEST}", file=path, hint="name the folder of a corpus")
-    recipe = make_recipe(face, layout)
+    recipe = make_recipe(settings)
     entries, rows = read_rows(file)
     problems = [f"{file}: {problem}" for problem in rows]
     problems += _problems_of_names(file, entries)
@@ -125,11 +125,11 @@ def check_corpus(
     checks = []
     for number, entry in enumerate(entries):
         try:
-            own = recipe_of(entry, recipe, known)
+            solved_as = recipe_of(entry, recipe, known)
         except SignfaceError as error:
             problems.append(f"{entry.path}: {error}")
-            own = recipe
-        checks.append(TakeCheck(number, entry, own, signers))
+            solved_as = recipe
+        checks.append(TakeCheck(number, entry, solved_as, signers))
     found: dict[int, CheckedTake] = {}
     results = on_cores(check_take, checks, workers=min(workers or os.cpu_count() or 1, max(1, len(checks))))
     for check, result in progress(results, len(checks)):
@@ -209,7 +209,7 @@ def _problems_of_markers(entry: TakeEntry, recipe: Recipe, take: Take) -> list[s
     try:
         labels = rename_to(take, layout.labels).labels
     except SignfaceError as error:
-        return [str(SignfaceError(error.problem, file=entry.path, hint=error.hint))]
+        return [str(error.at(entry.path))]
     heads = [label for label in layout.head_labels if label in labels]
     if len(heads) >= HEAD_MARKERS:
         return []

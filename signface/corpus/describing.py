@@ -15,10 +15,13 @@ from typing import TYPE_CHECKING
 
 from signface.corpus.manifest import TakeEntry
 from signface.corpus.origin import Origin, Recipe, content_digest, make_recipe
+from signface.corpus.signers import find_signer
 from signface.corpus.store import DescriptorStore
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.files import shipped
+from signface.settings.solve import SolveSettings
+from signface.signer import Signer
 
 if TYPE_CHECKING:
     from signface.face.layout import MarkerLayout
@@ -26,7 +29,7 @@ if TYPE_CHECKING:
     from signface.takes.take import Take
 
 
-def describe_entry(entry: TakeEntry, recipe: Recipe) -> Descriptors:
+def describe_entry(entry: TakeEntry, recipe: Recipe, signer: Signer | None = None) -> Descriptors:
     """Solve one take of a corpus. Weights (from a phone, or solved before) are kept.
 
     `start_s` of the row, the time of the first frame in the video, places the take on the time line of its
@@ -37,23 +40,19 @@ def describe_entry(entry: TakeEntry, recipe: Recipe) -> Descriptors:
     SignfaceError
         The recording cannot be read or solved; the message names it.
     """
-    from signface.annotation import describe
+    from signface.solver.solving import solve
 
     recording = read_entry(entry)
     if isinstance(recording, Descriptors):
         return recording
+    settings = SolveSettings() if recipe.settings is None else recipe.settings
+    if entry.neutral_s is not None:
+        settings = settings.changed(neutral=entry.neutral_s)
     try:
-        face = _face(recipe.face, recipe.face_digest)
-        return describe(
-            recording,
-            face=face,
-            layout=layout_for(recipe, recording.labels),
-            neutral="auto" if entry.neutral_s is None else entry.neutral_s,
-            method=recipe.method,
-            alpha=recipe.alpha,
-        )
+        face, layout = _face(settings.face, recipe.face_digest), layout_for(recipe, recording.labels)
+        return solve(recording, face, layout, settings=settings, signer=signer)
     except SignfaceError as error:
-        raise error if error.file else SignfaceError(error.problem, file=entry.path, hint=error.hint) from error
+        raise error.at(entry.path) from error
 
 
 def read_entry(entry: TakeEntry) -> Take | Descriptors:
@@ -66,7 +65,9 @@ def read_entry(entry: TakeEntry) -> Take | Descriptors:
     return recording.changed(f"start at {entry.start_s:g} s", start=entry.start_s)
 
 
-def stored_or_solved(entry: TakeEntry, origin: Origin, store: DescriptorStore | None) -> tuple[Descriptors, bool]:
+def stored_or_solved(
+    entry: TakeEntry, origin: Origin, store: DescriptorStore | None, folder: Path
+) -> tuple[Descriptors, bool]:
     """Descriptors of a take, and whether they had to be solved; what was solved is put in the store.
 
     Raises
@@ -77,7 +78,7 @@ def stored_or_solved(entry: TakeEntry, origin: Origin, store: DescriptorStore | 
     found = None if store is None else store.read(origin)
     if found is not None:
         return found, False
-    descriptors = describe_entry(entry, origin.recipe)
+    descriptors = describe_entry(entry, origin.recipe, find_signer(folder, entry.signer))
     if store is not None:
         store.write(origin, descriptors)
     return descriptors, True
@@ -91,11 +92,11 @@ def recipe_of(entry: TakeEntry, recipe: Recipe, known: dict[tuple[str, str | Non
     SignfaceError
         There is no such face or layout.
     """
-    if entry.face is None and entry.layout is None:
+    if recipe.settings is None or (entry.face is None and entry.layout is None):
         return recipe
-    names = (entry.face or recipe.face, entry.layout or recipe.layout)
+    names = (entry.face or recipe.settings.face, entry.layout or recipe.settings.layout)
     if names not in known:
-        known[names] = make_recipe(*names, method=recipe.method, alpha=recipe.alpha)
+        known[names] = make_recipe(recipe.settings.changed(face=names[0], layout=names[1]))
     return known[names]
 
 
@@ -115,5 +116,6 @@ def layout_for(recipe: Recipe, labels: tuple[str, ...]) -> MarkerLayout:
     """The layout of a recipe, or the shipped one that fits the labels of a take best."""
     from signface.face.layout_files import choose_layout, read_layout
 
-    face = _face(recipe.face, recipe.face_digest)
-    return choose_layout(labels, face) if recipe.layout is None else read_layout(recipe.layout, face)
+    settings = SolveSettings() if recipe.settings is None else recipe.settings
+    face = _face(settings.face, recipe.face_digest)
+    return choose_layout(labels, face) if settings.layout is None else read_layout(settings.layout, face)

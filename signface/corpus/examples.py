@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
 
 from signface.corpus.describing import recipe_of, stored_or_solved
 from signface.corpus.manifest import Corpus, TakeEntry
@@ -13,6 +14,7 @@ from signface.corpus.origin import Origin, Recipe, find_origin, make_recipe
 from signface.corpus.store import DescriptorStore, open_store
 from signface.errors import SignfaceError
 from signface.learn.examples import Example
+from signface.settings.solve import SolveSettings
 
 #: Takes solved at the same time.
 WORKERS = 2
@@ -21,9 +23,7 @@ WORKERS = 2
 def solve_examples(
     corpus: Corpus,
     *,
-    face: str = "default",
-    layout: str | None = None,
-    alpha: float | None = None,
+    settings: SolveSettings | None = None,
     workers: int = WORKERS,
     progress: Callable[[Iterable[Example]], Iterable[Example]] = iter,
 ) -> list[Example]:
@@ -35,11 +35,9 @@ def solve_examples(
     ----------
     corpus : Corpus
         Takes without an annotation are left out.
-    face, layout : str, optional
-        For the takes whose row names none: a shipped name or a path. By default the shipped face, and the shipped
-        layout that fits the markers of the take.
-    alpha : float, optional
-        Weight of the thin shell; the solver's own default when not given.
+    settings : SolveSettings, optional
+        How takes are solved; rows that name a face, a layout or a neutral frame have their own, and signers with a
+        file in the folder `signers` their own bases.
     workers : int
         Takes solved at the same time, each in a process of its own.
     progress : callable, optional
@@ -63,14 +61,14 @@ def solve_examples(
             hint="fill in the column annotation of takes.csv",
         )
     store = open_store(corpus.folder)
-    recipe = make_recipe(face, layout, alpha=alpha)
+    recipe = make_recipe(settings)
     known: dict[tuple[str, str | None], Recipe] = {}
     origins = [find_origin(entry, corpus.folder, recipe_of(entry, recipe, known)) for entry in entries]
-    return list(progress(_examples(entries, origins, store, workers)))
+    return list(progress(_examples(entries, origins, store, workers, corpus.folder)))
 
 
 def _examples(
-    entries: list[TakeEntry], origins: list[Origin], store: DescriptorStore | None, workers: int
+    entries: list[TakeEntry], origins: list[Origin], store: DescriptorStore | None, workers: int, folder: Path
 ) -> Iterator[Example]:
     """The examples in order: those of the store at once, the others as they are solved."""
     from joblib import Parallel, delayed
@@ -79,7 +77,7 @@ def _examples(
 
     found = [None if store is None else store.read(origin) for origin in origins]
     missing = [(e, o) for e, o, descriptors in zip(entries, origins, found, strict=True) if descriptors is None]
-    jobs = (delayed(stored_or_solved)(entry, origin, store) for entry, origin in missing)
+    jobs = (delayed(stored_or_solved)(entry, origin, store, folder) for entry, origin in missing)
     solved = iter(())
     if missing:
         solved = Parallel(n_jobs=min(workers, len(missing)), return_as="generator")(jobs)

@@ -18,6 +18,7 @@ from signface.corpus.describing import recipe_of
 from signface.corpus.manifest import Corpus
 from signface.corpus.origin import Origin, Recipe, content_digest, find_origin, make_recipe
 from signface.errors import SignfaceError
+from signface.settings.solve import SolveSettings
 
 #: Packages whose version can change a result.
 PACKAGES = ("signface", "numpy", "scipy", "scikit-learn", "pandas")
@@ -26,14 +27,14 @@ PACKAGES = ("signface", "numpy", "scipy", "scikit-learn", "pandas")
 SYNTHETIC = "synthetic.json"
 
 
-def corpus_facts(corpus: Corpus, *, face: str = "default", layout: str | None = None) -> dict[str, Any]:
+def corpus_facts(corpus: Corpus, *, settings: SolveSettings | None = None) -> dict[str, Any]:
     """What was worked on, for whoever wants to know whether they have the same.
 
     Parameters
     ----------
     corpus : Corpus
         Its annotated takes are described; their recordings are read.
-    face, layout : str, optional
+    settings : SolveSettings, optional
         As for `signface.corpus.examples.solve_examples`.
 
     Returns
@@ -50,7 +51,7 @@ def corpus_facts(corpus: Corpus, *, face: str = "default", layout: str | None = 
     SignfaceError
         A recording cannot be read.
     """
-    recipe = make_recipe(face, layout)
+    recipe = make_recipe(settings)
     known: dict[tuple[str, str | None], Recipe] = {}
     recordings, origins = [], []
     for entry in corpus:
@@ -67,16 +68,21 @@ def corpus_facts(corpus: Corpus, *, face: str = "default", layout: str | None = 
         "signers": sorted({own["signer"] for own in recordings}),
         "kinds": {kind: kinds[kind] for kind in sorted(kinds)},
         "digest": sha256(json.dumps(recordings, sort_keys=True).encode()).hexdigest(),
-        "faces": _used(origins, lambda own: (Path(own.recipe.face).name, own.recipe.face_digest)),
-        "layouts": _used(origins, lambda own: (_layout_name(own.recipe), own.recipe.layout_digest)),
-        "solvers": _used(origins, lambda own: (own.recipe.method, own.recipe.solver)),
+        "faces": _used(origins, lambda origin: (_name(origin, "face"), origin.recipe.face_digest)),
+        "layouts": _used(origins, lambda origin: (_name(origin, "layout"), origin.recipe.layout_digest)),
+        "solvers": _used(origins, lambda origin: (_name(origin, "method"), origin.recipe.solver)),
         "versions": {"python": platform.python_version(), **{name: version(name) for name in PACKAGES}},
         "recordings": recordings,
     }
 
 
-def _layout_name(recipe: Recipe) -> str:
-    return "the shipped layout that fits best" if recipe.layout is None else Path(recipe.layout).name
+def _name(origin: Origin, field: str) -> str:
+    """What the settings of a recipe name; `none` where nothing was solved."""
+    settings = origin.recipe.settings
+    if settings is None:
+        return "none"
+    name = getattr(settings, field)
+    return "the shipped layout that fits best" if name is None else Path(name).name
 
 
 def _used(origins: Sequence[Origin], name_and_digest: Any) -> list[dict[str, str]]:

@@ -21,13 +21,15 @@ from pathlib import Path
 from typing import Any
 
 from signface.corpus.manifest import TakeEntry
+from signface.corpus.signers import find_signer
 from signface.errors import SignfaceError
 from signface.files import shipped
+from signface.settings.solve import SolveSettings
 
 #: The modules between a recording and its descriptors.
 SOLVING_CODE = (
-    *("takes", "face", "solver", "corpus/describing.py", "annotation.py"),
-    *("descriptors.py", "descriptors_files.py", "columns.py", "frames.py", "settings.py", "solve_settings.py"),
+    *("takes", "face", "solver", "corpus/describing.py", "descriptors.py", "descriptors_files.py"),
+    *("columns.py", "frames.py", "settings/base.py", "settings/solve.py", "signer.py"),
 )
 
 
@@ -37,23 +39,15 @@ class Recipe:
 
     Parameters
     ----------
-    face : str
-        A shipped name or a path, as it was given; empty for recordings that hold weights.
-    layout : str, optional
-        As it was given; None for the shipped layout that fits the markers best.
-    method : str
-    alpha : float, optional
-        None for the method's own.
+    settings : SolveSettings, optional
+        None for recordings that hold weights: nothing is solved.
     face_digest, layout_digest : str
         SHA-256 of the content of the face and of the layout (of all shipped layouts where one is chosen).
     solver : str
         SHA-256 of the modules that read and solve, so that no change of ours passes unseen.
     """
 
-    face: str
-    layout: str | None
-    method: str
-    alpha: float | None
+    settings: SolveSettings | None
     face_digest: str
     layout_digest: str
     solver: str
@@ -61,12 +55,16 @@ class Recipe:
     @property
     def digest(self) -> str:
         """SHA-256 of what matters of it: contents, not names."""
-        return _digest_of([self.method, self.alpha, self.face_digest, self.layout_digest, self.solver])
+        how = None
+        if self.settings is not None:
+            how = {key: value for key, value in self.settings.as_dict().items() if key not in ("face", "layout")}
+        return _digest_of([how, self.face_digest, self.layout_digest, self.solver])
 
     @property
     def name(self) -> str:
         """Short name, for a folder: the face's and ten digits of the digest."""
-        return f"{Path(self.face).stem or 'weights'}-{self.digest[:10]}"
+        face = "weights" if self.settings is None else Path(self.settings.face).stem
+        return f"{face}-{self.digest[:10]}"
 
 
 @dataclass(frozen=True)
@@ -86,6 +84,8 @@ class Origin:
     neutral_s, start_s : float, optional
         As in `takes.csv`.
     recipe : Recipe
+    bases : str
+        SHA-256 of what is known of the signer's own bases; empty where the avatar's serve.
     """
 
     take: str
@@ -96,22 +96,21 @@ class Origin:
     neutral_s: float | None
     start_s: float | None
     recipe: Recipe
+    bases: str = ""
 
     @property
     def key(self) -> str:
         """SHA-256 of all of it."""
-        own = [self.take, self.file, self.signer, self.kind, self.recording, self.neutral_s, self.start_s]
-        return _digest_of([*own, self.recipe.digest])
+        row = [self.take, self.file, self.signer, self.kind, self.recording, self.neutral_s, self.start_s]
+        return _digest_of([*row, self.recipe.digest, self.bases])
 
     def as_dict(self) -> dict[str, Any]:
         """For the provenance of a stored file."""
         return asdict(self)
 
 
-def make_recipe(
-    face: str = "default", layout: str | None = None, *, method: str = "thin-shell", alpha: float | None = None
-) -> Recipe:
-    """The recipe of a face and a layout, each a shipped name or a path.
+def make_recipe(settings: SolveSettings | None = None) -> Recipe:
+    """The recipe of some settings, whose face and layout are each a shipped name or a path.
 
     Raises
     ------
@@ -120,21 +119,22 @@ def make_recipe(
 
     Examples
     --------
-    >>> make_recipe("default", "default-40").name
+    >>> make_recipe(SolveSettings(layout="default-40")).name
     'default-...'
     """
-    if layout is None:
+    settings = SolveSettings() if settings is None else settings
+    if settings.layout is None:
         layouts = shipped("layouts", ".csv")
         layout_digest = _digest_of([[name, content_digest(file)] for name, file in layouts.items()])
     else:
-        layout_digest = shipped_digest("layouts", ".csv", layout)
-    face_digest = shipped_digest("faces", ".glb", face)
-    return Recipe(face, layout, method, alpha, face_digest, layout_digest, code_digest(*SOLVING_CODE))
+        layout_digest = shipped_digest("layouts", ".csv", settings.layout)
+    face_digest = shipped_digest("faces", ".glb", settings.face)
+    return Recipe(settings, face_digest, layout_digest, code_digest(*SOLVING_CODE))
 
 
 def weights_recipe() -> Recipe:
     """The recipe of recordings that hold weights already."""
-    return Recipe("", None, "none", None, "", "", code_digest(*SOLVING_CODE))
+    return Recipe(None, "", "", code_digest(*SOLVING_CODE))
 
 
 def find_origin(entry: TakeEntry, folder: Path, recipe: Recipe) -> Origin:
@@ -165,6 +165,7 @@ def find_origin(entry: TakeEntry, folder: Path, recipe: Recipe) -> Origin:
         neutral_s=None if holds_weights else entry.neutral_s,
         start_s=entry.start_s,
         recipe=weights_recipe() if holds_weights else recipe,
+        bases="" if holds_weights else find_signer(folder, entry.signer).bases_digest,
     )
 
 

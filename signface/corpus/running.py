@@ -20,11 +20,11 @@ import re
 import socket
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from signface.channels.rules import read_channels
 from signface.corpus.cluster import WorkerDied, on_cluster, on_cores
@@ -39,10 +39,14 @@ from signface.corpus.origin import (
     shipped_digest,
     take_name,
 )
+from signface.corpus.signers import find_signer
 from signface.corpus.store import DescriptorStore
-from signface.elan.options import EafOptions
+from signface.elan.mapping import read_mapping
 from signface.errors import SignfaceError
 from signface.files import whole_file
+from signface.settings.eaf import EafOptions
+from signface.settings.solve import SolveSettings
+from signface.signer import Signer
 
 if TYPE_CHECKING:
     from signface.label.model import TrainedModel
@@ -84,6 +88,8 @@ class Job:
         How it is written, with absolute paths.
     options_digest : str
         Their SHA-256, the content of their files included.
+    signer : Signer
+        Who signs, with the level where the classifier needs one.
     """
 
     entry: TakeEntry
@@ -95,6 +101,7 @@ class Job:
     code: str
     options: EafOptions
     options_digest: str
+    signer: Signer
 
     @property
     def take(self) -> str:
@@ -140,10 +147,7 @@ def run_corpus(
     corpus: Corpus,
     *,
     output: Path | None = None,
-    face: str = "default",
-    layout: str | None = None,
-    method: str = "thin-shell",
-    alpha: float | None = None,
+    settings: SolveSettings | None = None,
     classifier: str = "default",
     workers: int | None = None,
     scheduler: str | None = None,
@@ -156,8 +160,10 @@ def run_corpus(
     corpus : Corpus
     output : Path, optional
         Folder of the annotations; `annotated` in the corpus by default. The logs are in its folder `logs`.
-    face, layout, method, alpha, classifier :
-        As in `signface.annotation.annotate`; a take whose row names a face or a layout has its own.
+    settings, classifier :
+        As in `signface.annotation.annotate`; a take whose row names a face or a layout has its own. Signers are those
+        of `signface.corpus.signers`; where the classifier normalises signers and no level of theirs is known, all takes
+        are solved first, and a signer's level is that of all of them.
     workers : int, optional
         Takes at a time on this machine; as many as it has cores by default.
     scheduler : str, optional
@@ -188,15 +194,23 @@ def run_corpus(
     folder = Path(os.path.abspath(corpus.folder))
     output = folder / ANNOTATED if output is None else Path(os.path.abspath(output))
     store = DescriptorStore(folder)  # says at once when a newer signface wrote it
-    recipe = make_recipe(face, layout, method=method, alpha=alpha)
+    recipe = make_recipe(settings)
     jobs, failed = plan_jobs(corpus, output, recipe, classifier=classifier, options=options)
     with only_run_in(output):
         yield from failed
-        if scheduler is None:
-            results = on_cores(annotate_job, jobs, workers=min(workers or os.cpu_count() or 1, max(1, len(jobs))))
-        else:
-            results = on_cluster(annotate_job, jobs, scheduler=scheduler)
-        for job, result in results:
+
+        def everywhere(work: Callable[[Job], Outcome]) -> Iterator[tuple[Job, Any]]:
+            if scheduler is not None:
+                return on_cluster(work, jobs, scheduler=scheduler)
+            return on_cores(work, jobs, workers=min(workers or os.cpu_count() or 1, max(1, len(jobs))))
+
+        from signface.label.persistence import read_card
+
+        if read_card(classifier).normalise == "signer":
+            for _ in everywhere(solve_job):  # what fails says so when it is annotated
+                pass
+            jobs = _with_levels(jobs, store)
+        for job, result in everywhere(annotate_job):
             if isinstance(result, WorkerDied):
                 result = Outcome(job.take, FAILED, message=f"{job.entry.path}: {result}")
                 _write_log(job, [result.message, FAILED])
@@ -218,10 +232,11 @@ def plan_jobs(
         of the options is missing or wrong.
     """
     options = (EafOptions() if options is None else options).absolute()
-    _ = options.rules  # a file that is wrong is named before the run
+    if options.mapping is not None:
+        read_mapping(options.mapping)  # a file that is wrong is named before the run
     if options.channels is not None:
         read_channels(options.channels)
-    options_digest = options.digest
+    options_digest = options.content_digest
     model, code = shipped_digest("classifiers", ".skops", classifier), code_digest(*ANNOTATING_CODE)
     folder = Path(os.path.abspath(corpus.folder))
     known: dict[tuple[str, str | None], Recipe] = {}
@@ -240,8 +255,36 @@ def plan_jobs(
         except SignfaceError as error:
             failed.append(Outcome(name, FAILED, message=f"{entry.path}: {error}"))
             continue
-        jobs[name] = Job(_absolute(entry), folder, output, own, classifier, model, code, options, options_digest)
+        signer = Signer(entry.signer)
+        jobs[name] = Job(
+            _absolute(entry), folder, output, own, classifier, model, code, options, options_digest, signer
+        )
     return list(jobs.values()), failed
+
+
+def solve_job(job: Job) -> Outcome:
+    """Make sure that the store has the descriptors of a take; a take that cannot be solved is told when annotated."""
+    with contextlib.suppress(Exception):
+        origin = find_origin(job.entry, job.corpus, job.recipe)
+        stored_or_solved(job.entry, origin, DescriptorStore(job.corpus), job.corpus)
+    return Outcome(job.take, DONE)
+
+
+def _with_levels(jobs: list[Job], store: DescriptorStore) -> list[Job]:
+    """The jobs with signers who have a level: of their file in the corpus, or of all their takes in the store."""
+    signers = {}
+    for name in {job.entry.signer for job in jobs}:
+        signer = find_signer(jobs[0].corpus, name)
+        if signer.level is None:
+            takes = []
+            for job in jobs:
+                if job.entry.signer == name:
+                    with contextlib.suppress(SignfaceError):
+                        takes.append(store.read(find_origin(job.entry, job.corpus, job.recipe)))
+            solved = [take for take in takes if take is not None]
+            signer = signer.with_level(solved) if solved else signer
+        signers[name] = signer
+    return [replace(job, signer=signers[job.entry.signer]) for job in jobs]
 
 
 def annotate_job(job: Job) -> Outcome:
@@ -266,7 +309,6 @@ def _annotate(job: Job, notes: list[str]) -> tuple[str, bool, str]:
     """State, whether it was solved, and what was found; `notes` gets what the log should say."""
     from signface.annotation import annotate
     from signface.elan.writing import check_writable, write_eaf
-    from signface.signer import Signer
 
     if (job.recipe.solver, job.code) != (code_digest(*SOLVING_CODE), code_digest(*ANNOTATING_CODE)):
         raise SignfaceError(
@@ -278,7 +320,7 @@ def _annotate(job: Job, notes: list[str]) -> tuple[str, bool, str]:
     if job.eaf.is_file() and _last_line(job.log) == ending:
         return BEFORE, False, ""
     store = DescriptorStore(job.corpus)
-    descriptors, solved = stored_or_solved(job.entry, origin, store)
+    descriptors, solved = stored_or_solved(job.entry, origin, store, job.corpus)
     notes += [f"recording {origin.file} (SHA-256 {origin.recording})", *descriptors.history]
     notes.append(f"{'solved into' if solved else 'taken from'} {store.path(origin)}")
     try:
@@ -286,8 +328,8 @@ def _annotate(job: Job, notes: list[str]) -> tuple[str, bool, str]:
     except SignfaceError as error:
         _write_log(job, [*notes, str(error), CORRECTED])
         return CORRECTED, solved, f"{job.eaf}: was worked in and stays as it is"
-    model, signer = _model(job.classifier, job.model), Signer(job.entry.signer)
-    annotation = annotate(descriptors, model, signer=signer, channels=job.options.channels or False)
+    model = _model(job.classifier, job.model)
+    annotation = annotate(descriptors, model, signer=job.signer, channels=job.options.channels or False)
     properties = {"file": origin.file}
     write_eaf(annotation, job.eaf, options=job.options, video=job.entry.video, date=DATE, properties=properties)
     _write_log(job, [*notes, str(annotation), f"written to {job.eaf}", ending])
@@ -343,7 +385,7 @@ def _names_of(job: Job) -> list[str]:
 def _annotation_key(job: Job, descriptors: str) -> str:
     """SHA-256 of all that an annotation depends on, from the key of the descriptors."""
     video = "" if job.entry.video is None else os.path.relpath(job.entry.video, job.output)
-    parts = [descriptors, job.model, job.code, job.options_digest, job.entry.signer, video]
+    parts = [descriptors, job.model, job.code, job.options_digest, job.entry.signer, video, job.signer.level_digest]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 

@@ -37,6 +37,8 @@ INPUTS = (
     ("face", "auxiliary", True, "A face model (.glb), if not the one that ships with signface"),
     ("layout", "auxiliary", True, "A marker layout (.csv), if the shipped ones do not fit the markers"),
     ("classifier", "auxiliary", True, "A trained classifier (.skops), if not the one that ships with signface"),
+    ("settings", "auxiliary", True, "A laboratory's settings (.toml): how recordings are solved"),
+    ("signer_file", "auxiliary", True, "What is known of the signer (.csv, .json): bases, where the face rests"),
 )
 TEXTS = (
     ("signer", "", "Names the tiers: affect@SIGNER"),

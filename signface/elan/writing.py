@@ -42,14 +42,15 @@ from signface.elan.document import (
     write_document,
 )
 from signface.elan.elements import CONSTRAINTS, add_link, add_media
+from signface.elan.mapping import read_mapping
 from signface.elan.merging import put_tiers
-from signface.elan.options import EafOptions
 from signface.elan.preferences import write_preferences
 from signface.elan.tiers import Tier, affect_tier, doubtful_tier, xml_text
 from signface.elan.upgrade import upgrade
 from signface.elan.vocabularies import AFFECT, Vocabulary
 from signface.errors import SignfaceError
 from signface.segmentation.segments import Segments
+from signface.settings.eaf import EafOptions
 from signface.signer import Signer
 
 if TYPE_CHECKING:
@@ -217,9 +218,16 @@ def prepare(
     if options.doubtful is not None:
         tiers = [doubtful_tier(segments, signer, below=options.doubtful, vocabulary=vocabulary), *tiers]
     all_tiers = (affect_tier(segments, signer, vocabulary=vocabulary), *tiers)
+    rules = {} if options.mapping is None else read_mapping(options.mapping)
     links = () if curves is None else _curve_files(root, file)
     source = file if into is not None or options.template is None else Path(options.template)
-    changed = put_tiers(root, all_tiers, mapping=options.rules, replace=replace, file=source)
+    changed = put_tiers(
+        root,
+        all_tiers,
+        mapping=rules,
+        replace=replace,
+        file=source,
+    )
     if changed or into is None:
         root.set("DATE", iso_date(date))
         _fill_header(root, file, segments, video, facts, links)

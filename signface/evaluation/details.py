@@ -16,12 +16,12 @@ import pandas as pd
 from signface.evaluation.importance import can_be_judged, permutation_importance
 from signface.evaluation.learning_curve import learning_curve, remembering
 from signface.evaluation.protocol import UNCALIBRATED, Evaluation, Fold
-from signface.label.labellers import NAMES
 from signface.learn.examples import Example
-from signface.learn.settings import TrainingSettings
 from signface.learn.training import train_model
 from signface.metrics.segmentation import segmentation_metrics
 from signface.segmentation.segments import Segments
+from signface.settings.choices import NAMES
+from signface.settings.training import TrainingSettings
 
 #: How the segmentation that learns nothing is called among the methods (thesis, 4.4.2).
 ENERGIES = "energies"

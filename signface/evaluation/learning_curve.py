@@ -22,9 +22,9 @@ from signface.label.labelling import label_spans
 from signface.label.model import TrainedModel
 from signface.label.spans import segment_means
 from signface.learn.examples import Example, in_order
-from signface.learn.settings import TrainingSettings
 from signface.learn.training import train_model
 from signface.segmentation.segments import Segments
+from signface.settings.training import TrainingSettings
 from signface.signer import signer_level
 
 #: Training takes that one classifier may be trained on in all, over the whole curve: what bounds its time.

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 from signface.evaluation.details import details
 from signface.evaluation.protocol import PROTOCOLS, UNCALIBRATED, Evaluation, Fold, evaluate, folds_of
-from signface.label.labellers import NAMES
 from signface.learn.examples import Example
-from signface.learn.settings import TrainingSettings
 from signface.segmentation.cutting import segment
 from signface.segmentation.segments import Segments
+from signface.settings.choices import NAMES
+from signface.settings.training import TrainingSettings
 
 
 class Measured(NamedTuple):

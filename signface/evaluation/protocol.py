@@ -21,19 +21,19 @@ from signface.channels.rules import find_intensities
 from signface.errors import SignfaceError
 from signface.label.calibration import brier_score, expected_calibration_error
 from signface.label.intensity import IntensityClassifier
-from signface.label.labellers import NAMES
 from signface.label.labelling import find_segments, label_segments, label_spans
 from signface.label.model import TrainedModel
 from signface.label.vocabulary import AFFECTS
 from signface.learn.examples import Example, signer_levels
 from signface.learn.folds import groups_of, inner_folds
 from signface.learn.ordinal import ordinal_metrics
-from signface.learn.settings import TrainingSettings
 from signface.learn.training import train_model
 from signface.metrics.classification import accuracy_interval, classification_metrics, mcnemar
 from signface.metrics.segmentation import segmentation_metrics
 from signface.segmentation.cutting import segment
 from signface.segmentation.segments import Segments, value_at
+from signface.settings.choices import NAMES
+from signface.settings.training import TrainingSettings
 from signface.signer import SignerLevel
 
 #: name: which takes train the classifier that a signer's test takes are given to.

@@ -1,6 +1,5 @@
 """The classifiers of the thesis (4.4.3) as scikit-learn estimators, and the names of all there are.
 
-- `NAMES`: those of the thesis; `SEQUENCE_NAMES`: the models that know time (`signface.sequence.hsmm`).
 - `make_labeller`: a new, untrained one.
 """
 
@@ -10,27 +9,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from signface.errors import SignfaceError
+from signface.settings.choices import NAMES, SEQUENCE_NAMES
 
 if TYPE_CHECKING:
     from sklearn.base import BaseEstimator
-
-#: name: what it is.
-NAMES = {
-    "knn1": "the nearest training frame",
-    "knn3": "the three nearest training frames",
-    "svm-linear": "support vector machine, linear kernel",
-    "svm-rbf": "support vector machine, Gaussian kernel",
-    "forest": "random forest",
-}
-
-#: Sequence models, which find boundaries and labels at once. name: what it is.
-SEQUENCE_NAMES = {
-    "net-hsmm": "neural network on frames, decoded by a hidden semi-Markov model",
-    "forest-viterbi": "random forest on frames, decoded by Viterbi's algorithm through a transition state",
-    "hmm": "hidden Markov model with Gaussian frames",
-    "crf": "linear-chain conditional random field",
-    "gru": "recurrent network, decoded by a hidden semi-Markov model",
-}
 
 
 def make_labeller(

@@ -107,7 +107,7 @@ def label_segments(
     """Label the segments of a take.
 
     A stable segment gets the label that the classifier gives to its mean descriptor (eq. 4.6), or to its frames
-    (`signface.label.choices.AGGREGATES`). Its confidence is the probability of that label averaged over the segment's
+    (`signface.settings.choices.AGGREGATES`). Its confidence is that label's probability averaged over the segment's
     frames, calibrated where the model is: a face that changes inside a segment, or lies between two expressions,
     lowers it, whichever the classifier.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -9,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from signface.descriptors import Descriptors
-from signface.errors import SignfaceError
+from signface.errors import SignfaceError, SignfaceWarning
 from signface.label.calibration import calibrated
-from signface.label.labellers import SEQUENCE_NAMES
 from signface.label.variants import DescriptorVariant
+from signface.settings.choices import SEQUENCE_NAMES
 from signface.signer import SignerLevel
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ class Card:
     features, normalise :
         Descriptor variant that it sees (`signface.label.variants.DescriptorVariant`).
     aggregate : str
-        How a segment gets its label: a name of `signface.label.choices.AGGREGATES`.
+        How a segment gets its label: a name of `signface.settings.choices.AGGREGATES`.
     balanced : bool
         Whether every label weighed the same in training.
     parameters : mapping
@@ -58,7 +59,7 @@ class Card:
         Version of signface that trained it.
     training, solve : mapping
         Settings it was trained with, and its takes were solved with, as plain values
-        (`signface.learn.settings.TrainingSettings`, `signface.solver.settings.SolveSettings`); empty in the cards of
+        (`signface.settings.training.TrainingSettings`, `signface.settings.solve.SolveSettings`); empty in the cards of
         old versions.
     """
 
@@ -157,6 +158,15 @@ class TrainedModel:
             As `columns`.
         """
         self.columns(descriptors)
+        if self.card.solve and descriptors.settings is not None:
+            differences = descriptors.settings.differences(self.card.solve)
+            if differences:
+                warnings.warn(
+                    f"{self.name}: was trained on takes solved otherwise than {descriptors.name}: "
+                    f"{', '.join(differences)}",
+                    SignfaceWarning,
+                    stacklevel=2,
+                )
         take = descriptors.on(self.card.bases)
         variant = DescriptorVariant(self.card.features, self.card.normalise)
         return take if variant.plain else variant.of(take, level)

@@ -20,11 +20,11 @@ from typing import Any
 
 from signface.errors import SignfaceError
 from signface.files import shipped, whole_file
-from signface.label.labellers import SEQUENCE_NAMES
 from signface.label.model import Card, TrainedModel
 from signface.label.plain_archive import is_plain, plain_entries, read_plain
 from signface.label.skops_archive import read_skops, skops_entries
 from signface.label.variants import DescriptorVariant
+from signface.settings.choices import SEQUENCE_NAMES
 
 CARD = "signface.json"
 

@@ -14,8 +14,8 @@ from sklearn.base import BaseEstimator, TransformerMixin
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.frames import Means
-from signface.label.choices import FEATURES, NORMALISATIONS
 from signface.segmentation.energy import bridged
+from signface.settings.choices import FEATURES, NORMALISATIONS
 from signface.signer import SignerLevel, signer_level
 
 #: Width of the windows, seconds.
@@ -38,9 +38,9 @@ class DescriptorVariant(TransformerMixin, BaseEstimator):
     Parameters
     ----------
     features : sequence of str
-        Names of `signface.label.choices.FEATURES`, in the order of the columns.
+        Names of `signface.settings.choices.FEATURES`, in the order of the columns.
     normalise : str
-        A name of `signface.label.choices.NORMALISATIONS`.
+        A name of `signface.settings.choices.NORMALISATIONS`.
 
     Examples
     --------

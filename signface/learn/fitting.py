@@ -17,7 +17,7 @@ from signface.label.model import Card, TrainedModel
 from signface.label.variants import DescriptorVariant
 from signface.label.vocabulary import AFFECTS
 from signface.learn.examples import Example, common_bases, frame_table, signer_levels
-from signface.learn.settings import TrainingSettings
+from signface.settings.training import TrainingSettings
 
 
 def fit_model(examples: Sequence[Example], settings: TrainingSettings, *, name: str = "model") -> TrainedModel:

@@ -14,8 +14,8 @@ from signface.errors import SignfaceError
 from signface.label.labelling import label_spans
 from signface.label.model import TrainedModel
 from signface.learn.examples import Example, in_order
-from signface.learn.settings import TrainingSettings
 from signface.learn.training import train_model
+from signface.settings.training import TrainingSettings
 
 
 def held_out_labels(

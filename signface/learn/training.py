@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from signface.errors import SignfaceError
 from signface.label.calibration import fit_calibration
@@ -15,16 +16,16 @@ from signface.learn.examples import Example, in_order
 from signface.learn.fitting import fit_model
 from signface.learn.folds import inner_folds
 from signface.learn.intensity import train_intensity
-from signface.learn.settings import TrainingSettings
 from signface.learn.tuning import balanced_accuracy, cross_validate, search_parameters
+from signface.settings.solve import SolveSettings
+from signface.settings.training import TrainingSettings
 
 
 def train_model(
     examples: Sequence[Example],
     settings: TrainingSettings = TrainingSettings(),
     *,
-    face: str = "unknown",
-    layout: str = "unknown",
+    solve: SolveSettings | None = None,
     corpus: str = "unknown",
     scores: Mapping[str, float] | None = None,
     name: str = "model",
@@ -47,7 +48,9 @@ def train_model(
     settings : TrainingSettings
         What is trained and how. Two trainings with one seed on the same takes give the same model. Calibration trains
         `folds` times more.
-    face, layout, corpus, scores : optional
+    solve : SolveSettings, optional
+        How the takes were solved; by default as they say themselves.
+    corpus, scores : optional
         For the model's card.
     name : str
         Name of the model.
@@ -71,8 +74,15 @@ def train_model(
         best, _ = search_parameters(takes, settings)
         chosen = settings.changed(parameters={**settings.parameters, **best})
     model = fit_model(takes, chosen, name=name)
+    solve = solve or next((t.descriptors.settings for t in takes if t.descriptors.settings is not None), None)
     card = replace(
-        model.card, face=face, layout=layout, corpus=corpus, scores=dict(scores or {}), training=settings.as_dict()
+        model.card,
+        face="unknown" if solve is None else Path(solve.face).name,
+        layout="chosen by markers" if solve is None or solve.layout is None else Path(solve.layout).name,
+        solve={} if solve is None else solve.as_dict(),
+        corpus=corpus,
+        scores=dict(scores or {}),
+        training=settings.as_dict(),
     )
     model = replace(model, card=card)
     if settings.calibrate:

@@ -21,7 +21,7 @@ from signface.label.labelling import label_spans
 from signface.learn.examples import Example, signer_levels
 from signface.learn.fitting import fit_model
 from signface.learn.folds import groups_of, inner_folds
-from signface.learn.settings import TrainingSettings
+from signface.settings.training import TrainingSettings
 
 #: classifier: what a search tries, parameter by parameter.
 GRIDS: dict[str, dict[str, list[Any]]] = {

@@ -16,11 +16,11 @@ from sklearn.exceptions import ConvergenceWarning
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
-from signface.label.labellers import SEQUENCE_NAMES
 from signface.segmentation.segments import Segments
 from signface.sequence.boundary_features import boundary_features
 from signface.sequence.semi_markov import SegmentModel
 from signface.sequence.take_labeller import HALVES, LEAST, TakeLabeller, log_odds, shares
+from signface.settings.choices import SEQUENCE_NAMES
 
 
 def make_sequence_labeller(name: str, *, seed: int = 0) -> TakeLabeller:

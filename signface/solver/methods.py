@@ -9,22 +9,11 @@ import numpy as np
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
+from signface.settings.solve import METHODS
 from signface.solver.base import Solver
 from signface.solver.rivals.direct import ThinShellDeformation
 from signface.solver.rivals.linear import Bounded, LeastSquares, NonNegative
 from signface.solver.thin_shell import ThinShellSolver
-
-#: name: what it is, for `--help` and reports.
-METHODS = {
-    "thin-shell": "least bending and stretching of the skin, soft bounds (the default)",
-    "least-squares": "least squares without bounds",
-    "nnls": "non-negative least squares",
-    "bounded": "least squares with weights from 0 to 1",
-    "direct-shell": "the skin bent by the markers alone, then read as weights",
-    "rbf-network": "a radial basis function network learnt from examples of the avatar",
-    "gaussian-process": "Gaussian process regression learnt from examples of the avatar",
-    "sparse-online-gp": "its sparse online form",
-}
 
 
 def make_solver(

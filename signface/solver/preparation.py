@@ -7,9 +7,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,10 +16,11 @@ from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
+from signface.settings.solve import SolveSettings
+from signface.signer import Signer
 from signface.solver.adaptation import MorphologicalAdaptation, SimilarityAdaptation, make_adaptation
 from signface.solver.base import Solution
 from signface.solver.creep import RATE_HZ, Creep
-from signface.solver.range_of_motion import read_signer
 from signface.solver.resting import resting_time
 from signface.takes.cleaning import CleanRecording, Progress, silently
 from signface.takes.filtering import CUTOFF_HZ
@@ -47,12 +46,8 @@ class Preparation:
 
     Parameters
     ----------
-    recording, face, layout, neutral, adaptation, short_gap_s, long_gap_s, cutoff_hz, filter_method, head_fallback
-        As for `signface.solver.solving.solve_take`.
-    creep : bool
-        Take away what the markers creep along the skin, see `signface.solver.creep`.
-    signer : path, optional
-        A file of the signer's own bases, see `signface.solver.range_of_motion`.
+    recording, face, layout, settings, signer
+        As for `signface.solver.solving.solve`.
     piece : int
         Frames worked on at a time.
     progress : callable, optional
@@ -75,7 +70,7 @@ class Preparation:
     Raises
     ------
     SignfaceError
-        As `signface.solver.solving.solve_take`.
+        As `signface.solver.solving.solve`.
     """
 
     def __init__(
@@ -84,25 +79,19 @@ class Preparation:
         face: FaceModel,
         layout: MarkerLayout,
         *,
-        neutral: str | float = "auto",
-        adaptation: str = "similarity",
-        short_gap_s: float = SHORT_S,
-        long_gap_s: float = LONG_S,
-        cutoff_hz: float = CUTOFF_HZ,
-        filter_method: str = "butterworth",
-        head_fallback: str | None = None,
-        creep: bool = False,
-        signer: str | PathLike[str] | None = None,
+        settings: SolveSettings | None = None,
+        signer: Signer | None = None,
         piece: int = PIECE,
         progress: Progress = silently,
     ) -> None:
+        settings = SolveSettings() if settings is None else settings
         clean = CleanRecording(
             recording,
             layout.labels,
-            short_gap_s=short_gap_s,
-            long_gap_s=long_gap_s,
-            cutoff_hz=cutoff_hz,
-            filter_method=filter_method,
+            short_gap_s=SHORT_S if settings.short_gap_s is None else settings.short_gap_s,
+            long_gap_s=LONG_S if settings.long_gap_s is None else settings.long_gap_s,
+            cutoff_hz=CUTOFF_HZ if settings.cutoff_hz is None else settings.cutoff_hz,
+            filter_method=settings.filter_method,
         )
         self.recording = clean
         labels = [label for label in layout.face_labels if label in clean.labels]
@@ -113,13 +102,13 @@ class Preparation:
                 file=clean.name,
                 hint="use a layout with more of its face markers",
             )
-        if neutral != "auto":
-            clean.frame_at(float(neutral))
+        if settings.neutral != "auto":
+            clean.frame_at(float(settings.neutral))
         view = clean.view(VIEW_FRAMES, piece=piece, progress=progress)
-        if neutral == "auto":
-            time, found = resting_time(view, face, layout, adaptation=adaptation), "found"
+        if settings.neutral == "auto":
+            time, how = resting_time(view, face, layout, adaptation=settings.adaptation), "found"
         else:
-            time, found = float(neutral), "given"
+            time, how = float(settings.neutral), "given"
         self.neutral_s, frame = time, clean.frame_at(time)
         around = self._around(frame)
         shown, _ = _median_places(clean.frames(*around), labels, clean.labels)
@@ -142,22 +131,23 @@ class Preparation:
             apply(self._onto, sample),
             clean.rate,
             head=head,
-            fallback=head_fallback,
+            fallback=settings.head_fallback,
             name=clean.name,
             neutral_s=time,
         )
         still, _ = self._still(*around)
         _, places = _median_places(still, shown, shown)
-        self.adaptation = make_adaptation(adaptation, places, target)
+        self.adaptation = make_adaptation(settings.adaptation, places, target)
         self._rest = self.adaptation.transform(places)
         dropped = [label for label in layout.face_labels if label not in shown]
-        self.note = f"neutral frame {found} at {time:.3f} s; adapted to {face.name}"
+        self.note = f"neutral frame {how} at {time:.3f} s; adapted to {face.name}"
         self.note += f" ({self.adaptation.description}) by {len(shown)} markers of {layout.name}"
         self.note += f" without {', '.join(dropped[:5])}{' ...' * (len(dropped) > 5)}" if dropped else ""
-        self.signer_bases = None if signer is None else read_signer(signer, face, self.layout)
-        self.note += "" if signer is None else f"; bases of the signer in {Path(signer).name}"
+        bases = None if signer is None else signer.bases
+        self.signer_bases = None if bases is None else bases.at(face, self.layout)
+        self.note += "" if bases is None else f"; bases of the signer in {Path(bases.source).name}"
         self._creep: Creep | None = None
-        if creep:
+        if settings.takes_creep_away:
             step = max(1, round(view.rate / RATE_HZ))
             rate = view.rate / step
             self._creep = Creep(
@@ -257,12 +247,19 @@ class PreparedTake(Content):
         )
 
 
-def prepare_take(recording: Recording, face: FaceModel, layout: MarkerLayout, **options: Any) -> PreparedTake:
+def prepare_take(
+    recording: Recording,
+    face: FaceModel,
+    layout: MarkerLayout,
+    *,
+    settings: SolveSettings | None = None,
+    signer: Signer | None = None,
+) -> PreparedTake:
     """Clean a take, take the head's motion away and adapt it to the avatar (Reverdy 2019, 5.2.1 and 5.2.2).
 
     Parameters and errors are those of `Preparation`.
     """
-    preparation = Preparation(recording, face, layout, **options)
+    preparation = Preparation(recording, face, layout, settings=settings, signer=signer)
     return PreparedTake(*preparation.frames(0, recording.n_frames), preparation)
 
 

@@ -2,7 +2,6 @@
 
 - `Shown`: when which bases are shown; `read_shown` reads it from a table.
 - `calibrate_shown`: the signer's bases at the markers.
-- `write_signer`, `read_signer`: them in a file.
 
 A range-of-motion take ("brows up, brows down, open the mouth, ...") says which base moves at a time, not how far. So
 strengths and bases are found in turns: strengths of the bases shown from the bases as known so far, within each
@@ -13,18 +12,15 @@ what is learnt is where and in which direction it moves the markers.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
-from signface.files import whole_file
 from signface.solver.calibration import calibrate
 
 #: What the avatar's bases count beside those shown, see `signface.solver.calibration.calibrate`: twice as much as where
@@ -179,56 +175,3 @@ def _from_rest(displacements: np.ndarray) -> np.ndarray | None:
     before, after = (np.nanmedian(end, axis=0) for end in ends)
     share = np.linspace(0.0, 1.0, len(displacements))[:, None, None]
     return displacements - (1.0 - share) * before - share * after
-
-
-def write_signer(
-    bases: np.ndarray, learnt: Sequence[str], face: FaceModel, layout: MarkerLayout, path: str | PathLike[str]
-) -> None:
-    """Write a signer's bases: a csv with the columns `base, marker, x, y, z`, in the face's unit.
-
-    Only bases that were learnt are written: the others are the avatar's.
-    """
-    with whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(["base", "marker", "x", "y", "z"])
-        for name in learnt:
-            for marker, place in zip(layout.face_labels, bases[face.names.index(name)], strict=True):
-                writer.writerow([name, marker, *(f"{value:.5f}" for value in place)])
-
-
-def read_signer(path: str | PathLike[str], face: FaceModel, layout: MarkerLayout) -> np.ndarray:
-    """(N, P, 3) bases of a signer at the markers of a layout; what the file does not say is the avatar's.
-
-    Raises
-    ------
-    SignfaceError
-        The file is none written by `write_signer`, or knows none of the face's bases at the layout's markers.
-    """
-    file = Path(path)
-    import pandas as pd
-
-    try:
-        table = pd.read_csv(file, dtype={"base": str, "marker": str})
-        places = table[["x", "y", "z"]].to_numpy(dtype=np.float64)
-        rows = list(zip(table["base"], table["marker"], strict=True))
-    except FileNotFoundError:
-        raise SignfaceError("no such file", file=file) from None
-    except (OSError, ValueError, KeyError) as error:
-        raise SignfaceError(
-            "is no signer's file: its columns are base, marker, x, y, z", file=file, hint="signface calibrate makes one"
-        ) from error
-    if not np.isfinite(places).all():
-        raise SignfaceError("has cells that are not numbers", file=file)
-    bases, known = layout.bases(face), 0
-    base_at, marker_at = ({name: i for i, name in enumerate(own)} for own in (face.names, layout.face_labels))
-    for (base, marker), place in zip(rows, places, strict=True):
-        if base in base_at and marker in marker_at:
-            bases[base_at[base], marker_at[marker]] = place
-            known += 1
-    if not known:
-        raise SignfaceError(
-            f"says nothing of the bases of {face.name} at the markers of {layout.name}",
-            file=file,
-            hint="calibrate the signer with this face and layout",
-        )
-    return bases

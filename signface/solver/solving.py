@@ -1,6 +1,6 @@
 """A recording to descriptors: the whole way from markers to weights.
 
-- `solve_take`: the whole way, to descriptors in memory.
+- `solve`: the whole way, to descriptors in memory.
 - `solve_pieces`: the same piece by piece, for recordings of any length.
 - `prepare_take`: the first half, marker displacements on the avatar (`signface.solver.preparation`).
 
@@ -10,8 +10,7 @@ it. One that is no longer than a piece is cleaned once.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -19,6 +18,8 @@ from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
+from signface.settings.solve import SolveSettings
+from signface.signer import Signer
 from signface.solver.methods import make_solver
 from signface.solver.preparation import Preparation, PreparedTake, prepare_take
 from signface.solver.thin_shell import ThinShellSolver
@@ -26,51 +27,39 @@ from signface.solver.uncertainty import deviations
 from signface.takes.cleaning import Progress, silently
 from signface.takes.recording import PIECE, Recording, pieces
 
-__all__ = ["PreparedTake", "prepare_take", "solve_pieces", "solve_take"]
+__all__ = ["PreparedTake", "prepare_take", "solve", "solve_pieces"]
 
 
-def solve_take(
-    recording: Recording,
-    face: FaceModel,
-    layout: MarkerLayout,
+def solve(
+    recording: Recording | Descriptors,
+    face: FaceModel | None = None,
+    layout: MarkerLayout | None = None,
     *,
-    neutral: str | float = "auto",
-    adaptation: str = "similarity",
-    method: str = "thin-shell",
-    alpha: float | None = None,
-    **options: Any,
+    settings: SolveSettings | None = None,
+    signer: Signer | None = None,
+    uncertainty: bool = False,
+    piece: int = PIECE,
+    progress: Progress = silently,
 ) -> Descriptors:
     """Blendshape weights of a recording (Reverdy 2019, 5.2), all of them in memory.
 
     Parameters
     ----------
-    recording : Take or TakeFile
-        As it was read; markers in any place of the room.
-    face : FaceModel
-        The avatar.
-    layout : MarkerLayout
-        Where the markers stand on the avatar, and which of them carry the head.
-    neutral : float or "auto"
-        Time in seconds of a frame with a neutral face; `auto` looks for one.
-    adaptation : str
-        `similarity` or `rbf` (the thesis's), see `signface.solver.adaptation`.
-    method, alpha, sparsity, head_slack, slip
-        See `signface.solver.methods.make_solver`.
-    creep : bool, optional
-        Take away what the markers creep along the skin (`signface.solver.creep`); by default for the thin shell, and
-        not for its rivals.
-    signer : path, optional
-        A file of the signer's own bases, made by `signface calibrate`; only the thin shell uses it.
+    recording : Take, TakeFile or Descriptors
+        As it was read; markers in any place of the room. Descriptors (weights from a phone) are given back.
+    face : FaceModel, optional
+        The avatar; the one that the settings name by default.
+    layout : MarkerLayout, optional
+        Where the markers stand on the avatar, and which of them carry the head; by default the one that the settings
+        name, or the shipped one that fits the markers best.
+    settings : SolveSettings, optional
+        How markers become weights.
+    signer : Signer, optional
+        Whose take it is: with bases of their own, where they are known, in place of the avatar's (thin shell only).
     uncertainty : bool
         Also give the weights' standard deviations (`signface.solver.uncertainty`); only the thin shell can.
-    short_gap_s, long_gap_s : float
-        Longest gaps that are filled (seconds), see `signface.takes.gaps.fill_gaps`.
-    cutoff_hz, filter_method
-        See `signface.takes.filtering.lowpass`.
-    head_fallback : str, optional
-        `least-moving`: carry the head by the least-moving markers where head markers do not suffice.
     piece : int
-        Frames worked on at a time; what is found does not depend on it but by rounding.
+        Frames worked on at a time; what comes out does not depend on it but by rounding.
     progress : callable, optional
         Shows how far we are, see `signface.takes.cleaning.Progress`.
 
@@ -86,25 +75,34 @@ def solve_take(
         The take's markers do not match the layout, the head's motion cannot be found, the neutral time is outside
         the take, or no face marker is seen there.
 
+    See Also
+    --------
+    solve_pieces : the same for recordings of any length.
+    signface.annotation.annotate : the weights, and what they mean.
+
     Examples
     --------
-    >>> from signface.face.layout_files import choose_layout
-    >>> from signface.face.reading import read_face
+    >>> from signface.files import bundled_corpus
     >>> from signface.takes.reading import read_take
-    >>> face, take = read_face("default"), read_take("take.c3d")  # doctest: +SKIP
-    >>> solve_take(take, face, choose_layout(take.labels, face)).weights.shape  # doctest: +SKIP
-    (12000, 51)
+    >>> solve(read_take(bundled_corpus() / "M1_IE_J.c3d")).weights.shape
+    (2146, 51)
     """
-    parts = list(
-        solve_pieces(
-            recording, face, layout, neutral=neutral, adaptation=adaptation, method=method, alpha=alpha, **options
-        )
+    pieces = solve_pieces(
+        recording,
+        face,
+        layout,
+        settings=settings,
+        signer=signer,
+        uncertainty=uncertainty,
+        piece=piece,
+        progress=progress,
     )
+    parts = list(pieces)
     if len(parts) == 1:
         return parts[0]
     return Descriptors(
         weights=np.concatenate([part.weights for part in parts]),
-        names=face.names,
+        names=parts[0].names,
         rate=recording.rate,
         start=recording.start,
         residual=np.concatenate([part.residual for part in parts if part.residual is not None]),
@@ -112,45 +110,46 @@ def solve_take(
         deviation=None if parts[0].deviation is None else np.concatenate([part.deviation for part in parts]),
         name=recording.name,
         history=parts[-1].history,
+        settings=parts[0].settings,
     )
 
 
 def solve_pieces(
-    recording: Recording,
-    face: FaceModel,
-    layout: MarkerLayout,
+    recording: Recording | Descriptors,
+    face: FaceModel | None = None,
+    layout: MarkerLayout | None = None,
     *,
-    method: str = "thin-shell",
-    alpha: float | None = None,
-    sparsity: float | None = None,
-    head_slack: float | None = None,
-    slip: float | None = None,
-    creep: bool | None = None,
+    settings: SolveSettings | None = None,
+    signer: Signer | None = None,
     uncertainty: bool = False,
     piece: int = PIECE,
     progress: Progress = silently,
-    **options: Any,
 ) -> Iterator[Descriptors]:
     """Blendshape weights of a recording, piece by piece, one after the other.
 
-    Parameters and errors are those of `solve_take`. The last piece has the history of the whole take; how many gaps
-    were filled, say, is not known before.
+    Parameters and errors are those of `solve`. The last piece has the history of the whole take; how many gaps were
+    filled, say, is not known before.
 
     Yields
     ------
     Descriptors
     """
+    if isinstance(recording, Descriptors):
+        yield recording
+        return
     if piece < 1:
         raise SignfaceError(f"a piece has one frame or more, not {piece}")
-    given = {"alpha": alpha, "sparsity": sparsity, "head_slack": head_slack, "slip": slip}
-    given = {name: value for name, value in given.items() if value is not None}
-    creep = method == "thin-shell" if creep is None else creep
-    preparation = Preparation(recording, face, layout, creep=creep, piece=piece, progress=progress, **options)
-    solver = make_solver(method, face, preparation.layout, signer_bases=preparation.signer_bases, **given)
+    settings = SolveSettings() if settings is None else settings
+    face, layout = face_and_layout(recording.labels, settings, face, layout)
+    preparation = Preparation(recording, face, layout, settings=settings, signer=signer, piece=piece, progress=progress)
+    given = settings.solver_options
+    solver = make_solver(settings.method, face, preparation.layout, signer_bases=preparation.signer_bases, **given)
     known = solver if isinstance(solver, ThinShellSolver) else None
     if uncertainty and known is None:
-        raise SignfaceError(f"the method {method} does not say how uncertain it is", hint="use thin-shell")
-    note = f"{preparation.note}; solve {method}" + "".join(f" {name}={value:g}" for name, value in given.items())
+        raise SignfaceError(f"the method {settings.method} does not say how uncertain it is", hint="use thin-shell")
+    note = f"{preparation.note}; solve {settings.method}" + "".join(
+        f" {name}={value:g}" for name, value in given.items()
+    )
     warnings = [f"warning: {known.markers.warning}"] if known is not None and known.markers.warning else []
     for begin, end in progress(pieces(recording.n_frames, piece), "solving"):
         displacements, head = preparation.frames(begin, end)
@@ -165,4 +164,21 @@ def solve_pieces(
             deviation=deviations(known, solution) if uncertainty and known is not None else None,
             name=recording.name,
             history=(*(preparation.history if end == recording.n_frames else recording.history), note, *warnings),
+            settings=settings,
         )
+
+
+def face_and_layout(
+    labels: Sequence[str],
+    settings: SolveSettings,
+    face: FaceModel | None = None,
+    layout: MarkerLayout | None = None,
+) -> tuple[FaceModel, MarkerLayout]:
+    """The face and layout given, or those that the settings name for markers of these labels."""
+    from signface.face.layout_files import choose_layout, read_layout
+    from signface.face.reading import read_face
+
+    face = read_face(settings.face) if face is None else face
+    if layout is None:
+        layout = choose_layout(labels, face) if settings.layout is None else read_layout(settings.layout, face)
+    return face, layout

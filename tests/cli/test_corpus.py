@@ -16,10 +16,10 @@ from signface.corpus.manifest import TakeEntry, read_corpus, write_takes
 from signface.descriptors_files import write_weights
 from signface.elan.writing import write_eaf
 from signface.evaluation.measure import measure
-from signface.label.labellers import NAMES
 from signface.label.persistence import load_model, read_card
-from signface.learn.settings import TrainingSettings
 from signface.segmentation.segments import Segments
+from signface.settings.choices import NAMES
+from signface.settings.training import TrainingSettings
 from tests.fixtures.hand_made import corpus
 
 

@@ -22,6 +22,7 @@ from signface.descriptors_files import write_weights
 from signface.errors import SignfaceError
 from signface.label.persistence import save_model
 from signface.learn.training import train_model
+from signface.settings.solve import SolveSettings
 from tests.conftest import REPOSITORY
 from tests.fixtures.hand_made import corpus as hand_made_corpus
 from tests.fixtures.training import quick
@@ -203,7 +204,7 @@ def test_what_cannot_begin_is_one_clear_error_and_writes_nothing(feel, ready):
     twin = TakeEntry(takes[0].path.with_suffix(".parquet"), "S1", "IE")
     for attempt, said in (
         ({"classifier": "nobody"}, "nobody"),
-        ({"classifier": mine, "face": "nobody"}, "nobody"),
+        ({"classifier": mine, "settings": SolveSettings(face="nobody")}, "nobody"),
         ({"classifier": mine, "output": takes[0].path / "out"}, "cannot be written"),
     ):
         with pytest.raises(SignfaceError, match=said):

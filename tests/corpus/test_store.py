@@ -28,7 +28,9 @@ from signface.descriptors_files import read_weights, write_weights
 from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
 from signface.files import bundled_corpus, shipped
+from signface.settings.solve import SolveSettings
 from tests.fixtures.hand_made import BASES, example, moving_face
+from tests.fixtures.settings import different_settings
 
 
 @pytest.fixture(scope="module")
@@ -119,9 +121,21 @@ def test_descriptors_of_another_origin_are_never_used(origin, laugh, tmp_path, c
     assert store.read(origin) is not None
 
 
-@pytest.mark.parametrize("field", ["method", "alpha", "face_digest", "layout_digest", "solver"])
-def test_another_recipe_has_a_folder_of_its_own(origin, laugh, tmp_path, field):
-    other = replace(origin, recipe=replace(origin.recipe, **{field: 0.7 if field == "alpha" else "other"}))
+@pytest.mark.parametrize(
+    "change",
+    [
+        *({item.name: value} for item, value in different_settings()),
+        {"face_digest": "other"},
+        {"layout_digest": "other"},
+        {"solver": "other"},
+    ],
+    ids=lambda change: next(iter(change)),
+)
+def test_another_recipe_has_a_folder_of_its_own(origin, laugh, tmp_path, change):
+    recipe = origin.recipe
+    if next(iter(change)) in recipe.settings.as_dict():
+        change = {"settings": recipe.settings.changed(**change)}
+    other = replace(origin, recipe=replace(recipe, **change))
     store = DescriptorStore(tmp_path)
     store.write(origin, laugh)
     assert store.read(other) is None
@@ -131,12 +145,12 @@ def test_another_recipe_has_a_folder_of_its_own(origin, laugh, tmp_path, field):
 def test_a_recipe_is_known_by_content_not_by_name(tmp_path):
     copy = tmp_path / "mine.csv"
     shutil.copy(shipped("layouts", ".csv")["default-40"], copy)
-    assert make_recipe(layout=str(copy)).digest == make_recipe(layout="default-40").digest
+    assert make_recipe(SolveSettings(layout=str(copy))).digest == make_recipe(SolveSettings(layout="default-40")).digest
     copy.write_text(copy.read_text() + "\n")
-    assert make_recipe(layout=str(copy)).digest != make_recipe(layout="default-40").digest
+    assert make_recipe(SolveSettings(layout=str(copy))).digest != make_recipe(SolveSettings(layout="default-40")).digest
     for missing in ({"face": "nobody"}, {"layout": "nobody"}):
         with pytest.raises(SignfaceError, match="nobody"):
-            make_recipe(**missing)
+            make_recipe(SolveSettings(**missing))
 
 
 def test_a_recording_that_was_exported_again_is_another_origin(tmp_path, recipe, laugh):
@@ -147,7 +161,7 @@ def test_a_recording_that_was_exported_again_is_another_origin(tmp_path, recipe,
     after = find_origin(entry, tmp_path, recipe)
     assert before.key != after.key
     assert DescriptorStore(tmp_path).path(before) == DescriptorStore(tmp_path).path(after)
-    assert before.recipe.face == ""  # weights have nothing to do with a face
+    assert before.recipe.settings is None  # weights have nothing to do with a face
 
 
 def test_a_take_outside_the_corpus_has_a_place_in_the_store(tmp_path):
@@ -245,7 +259,7 @@ def test_training_and_evaluation_take_what_is_stored(tmp_path, laugh):
 
 
 def test_a_solved_take_is_stored_exactly(mini, tmp_path):
-    from signface.annotation import describe
+    from signface.solver.solving import solve
     from signface.takes.reading import read_take
 
     take = mini.takes[1]
@@ -257,7 +271,7 @@ def test_a_solved_take_is_stored_exactly(mini, tmp_path):
     corpus = read_corpus(tmp_path)
     (solved,) = solve_examples(corpus)
     (stored,) = solve_examples(corpus)
-    plain = describe(read_take(take.path), neutral=corpus.takes[0].neutral_s)
+    plain = solve(read_take(take.path), settings=SolveSettings(neutral=corpus.takes[0].neutral_s))
     for array in ("weights", "residual", "head"):
         expected = getattr(plain, array).tobytes()
         assert getattr(solved.descriptors, array).tobytes() == expected

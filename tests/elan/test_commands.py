@@ -17,7 +17,6 @@ from signface.descriptors import Descriptors
 from signface.descriptors_files import write_weights
 from signface.elan.document import read_document, tier_rows
 from signface.elan.mapping import ChannelRule, read_mapping
-from signface.elan.options import EafOptions
 from signface.elan.recogniser import extensions_folder, read_parameters, write_extension, write_tier_file
 from signface.elan.reference import read_corrections, read_reference
 from signface.elan.tiers import affect_tier
@@ -27,6 +26,7 @@ from signface.evaluation.corrections import changes, summarise_changes
 from signface.label.persistence import load_model, save_model
 from signface.learn.training import Example, train_model
 from signface.segmentation.segments import Segments
+from signface.settings.eaf import EafOptions
 from tests.elan.test_templates import LAB, MAPPING
 from tests.fixtures.elan_files import assert_valid, labelled, mapped
 from tests.fixtures.training import quick

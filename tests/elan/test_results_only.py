@@ -107,12 +107,12 @@ def test_the_digest_of_options_follows_the_content_of_their_files(tmp_path):
     file = tmp_path / "mapping.toml"
     file.write_text('[affect]\ntier = "A"\n')
     options = sf.EafOptions(mapping=str(file))
-    before = options.digest
-    assert options.absolute().digest == before
+    before = options.content_digest
+    assert options.absolute().content_digest == before
     (tmp_path / "same.toml").write_bytes(file.read_bytes())
-    assert options.changed(mapping=str(tmp_path / "same.toml")).digest == before
+    assert options.changed(mapping=str(tmp_path / "same.toml")).content_digest == before
     file.write_text('[affect]\ntier = "B"\n')
-    assert options.digest != before
+    assert options.content_digest != before
 
 
 def test_the_script_of_the_manual_runs(mini, tmp_path, monkeypatch, capsys):

@@ -10,11 +10,11 @@ from signface.annotation import Annotation
 from signface.channels.rules import find_channels, find_intensities
 from signface.elan.channels import channel_tiers
 from signface.elan.mapping import ChannelRule
-from signface.elan.options import EafOptions
 from signface.elan.reference import read_reference
 from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
 from signface.segmentation.segments import Segments
+from signface.settings.eaf import EafOptions
 from signface.signer import Signer
 from tests.channels.test_rules import BROWS_UP, moving, pulse, turning
 from tests.elan.test_templates import LAB

@@ -13,9 +13,9 @@ from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.evaluation import protocol as protocol_module
 from signface.evaluation.protocol import PROTOCOLS, Fold, evaluate, folds_of, most_overlapping
-from signface.label.labellers import NAMES
 from signface.label.vocabulary import AFFECTS
 from signface.learn.training import train_model
+from signface.settings.choices import NAMES
 from tests.fixtures.hand_made import BASES, corpus, example
 
 

@@ -24,7 +24,7 @@ from tests.fixtures.training import quick
 
 @pytest.fixture(scope="module")
 def model():
-    return train_model([e for e in corpus() if e.kind == "IE"], quick("knn3"), face="default", name="toy")
+    return train_model([e for e in corpus() if e.kind == "IE"], quick("knn3"), name="toy")
 
 
 def labelled(descriptors, model):

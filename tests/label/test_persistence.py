@@ -19,12 +19,12 @@ from sklearn.preprocessing import FunctionTransformer
 from signface.errors import SignfaceError
 from signface.files import shipped
 from signface.label.intensity import IntensityClassifier
-from signface.label.labellers import NAMES
 from signface.label.labelling import find_segments
 from signface.label.persistence import CARD, load_model, read_card, save_model
 from signface.label.skops_archive import RENAMED_ATTRIBUTES, RENAMED_MODULES, without_padding
 from signface.label.vocabulary import AFFECTS
 from signface.learn.training import train_model
+from signface.settings.choices import NAMES
 from tests.fixtures.hand_made import corpus, example
 from tests.fixtures.training import quick
 

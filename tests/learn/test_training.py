@@ -12,12 +12,14 @@ from sklearn.model_selection import GridSearchCV
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
-from signface.label.labellers import NAMES, SEQUENCE_NAMES, make_labeller
+from signface.label.labellers import make_labeller
 from signface.label.labelling import label_spans
 from signface.learn.examples import Example, training_frames
-from signface.learn.settings import TrainingSettings
 from signface.learn.training import train_model
 from signface.segmentation.segments import Segments
+from signface.settings.choices import NAMES, SEQUENCE_NAMES
+from signface.settings.solve import SolveSettings
+from signface.settings.training import TrainingSettings
 from tests.fixtures.hand_made import BASES, corpus, example
 from tests.fixtures.training import quick
 
@@ -113,8 +115,9 @@ def test_takes_of_other_faces_are_not_mixed(takes):
 
 
 def test_the_card_says_what_the_model_was_trained_on(takes):
-    card = train_model(takes, quick("knn3", seed=7), corpus="toy", face="default").card
+    card = train_model(takes, quick("knn3", seed=7), corpus="toy", solve=SolveSettings(alpha=0.3)).card
     assert (card.classifier, card.corpus, card.face, card.seed) == ("knn3", "toy", "default", 7)
+    assert SolveSettings.from_dict(card.solve) == SolveSettings(alpha=0.3)
     assert (card.signers, card.kinds, card.bases) == (("S1", "S2"), ("IE",), BASES)
     assert len(card.takes) == len(takes)
     assert card.labels == tuple(sorted(card.labels))

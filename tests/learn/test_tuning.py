@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 
 from signface.errors import SignfaceError
 from signface.label.calibration import brier_score, calibrated, expected_calibration_error, fit_calibration
-from signface.label.labellers import NAMES, SEQUENCE_NAMES, make_labeller
+from signface.label.labellers import make_labeller
 from signface.label.labelling import find_segments
 from signface.learn.training import train_model
 from signface.learn.tuning import GRIDS
+from signface.settings.choices import NAMES, SEQUENCE_NAMES
 from tests.fixtures.hand_made import corpus, example
 from tests.fixtures.training import quick
 

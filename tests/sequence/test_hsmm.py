@@ -13,13 +13,13 @@ from sklearn.base import clone
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
-from signface.label.labellers import SEQUENCE_NAMES
 from signface.label.labelling import find_segments, label_spans
 from signface.label.persistence import load_model, save_model
 from signface.learn.training import train_model
 from signface.metrics.segmentation import boundary_f1
 from signface.sequence.hsmm import make_sequence_labeller
 from signface.sequence.semi_markov import SegmentModel
+from signface.settings.choices import SEQUENCE_NAMES
 from tests.fixtures.hand_made import corpus, example
 from tests.fixtures.training import quick
 

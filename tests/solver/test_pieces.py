@@ -10,8 +10,9 @@ from signface.descriptors import Descriptors
 from signface.descriptors_files import WeightsWriter, read_weights, write_weights
 from signface.errors import SignfaceError
 from signface.face.layout_files import read_layout
+from signface.settings.solve import SolveSettings
 from signface.solver import preparation
-from signface.solver.solving import solve_pieces, solve_take
+from signface.solver.solving import solve, solve_pieces
 from signface.takes import gaps
 from signface.takes.cleaning import CleanRecording
 from signface.takes.filtering import lowpass
@@ -53,7 +54,7 @@ def joined(parts, field):
 
 @pytest.mark.parametrize("piece", [333])
 def test_pieces_give_the_weights_of_the_whole(piece, gappy, face, layout):
-    whole = solve_take(gappy, face, layout)
+    whole = solve(gappy, face, layout)
     parts = list(solve_pieces(gappy, face, layout, piece=piece))
     assert [part.n_frames for part in parts][:-1] == [piece] * (len(parts) - 1)
     # The solver starts each frame from the one before, and ends when the gradient is below 1e-8.
@@ -72,8 +73,8 @@ def test_cleaning_in_pieces_is_cleaning_the_take(gappy, layout):
 
 
 def test_a_filter_that_needs_the_whole_take_gets_it(gappy, face, layout):
-    options = {"neutral": 0.33, "filter_method": "raised-sine"}
-    whole = solve_take(gappy, face, layout, **options)
+    options = {"settings": SolveSettings(neutral=0.33, filter_method="raised-sine")}
+    whole = solve(gappy, face, layout, **options)
     parts = list(solve_pieces(gappy, face, layout, piece=611, **options))
     np.testing.assert_allclose(joined(parts, "weights"), whole.weights, rtol=0, atol=2e-8)
 
@@ -91,7 +92,7 @@ def test_files_are_read_in_the_same_pieces_as_takes(gappy, tmp_path):
 def test_memory_does_not_grow_with_the_recording(gappy, face, layout, tmp_path, monkeypatch):
     monkeypatch.setattr(preparation, "VIEW_FRAMES", 500)
     monkeypatch.setattr(gaps, "SAMPLE_FRAMES", 100)
-    solve_take(gappy, face, layout, neutral=0.33)  # what is computed once for a face
+    solve(gappy, face, layout, settings=SolveSettings(neutral=0.33))  # what is computed once for a face
     recordings = {}
     for repeats in (4, 12):
         positions = np.tile(gappy.positions, (repeats, 1, 1))
@@ -103,7 +104,8 @@ def test_memory_does_not_grow_with_the_recording(gappy, face, layout, tmp_path, 
     CleanRecording(recording, layout.labels).view(500, piece=600)
     assert tracemalloc.get_traced_memory()[1] < 0.7 * size
     recording, size = recordings[4]
-    held = [tracemalloc.get_traced_memory()[0] for _ in solve_pieces(recording, face, layout, neutral=0.33, piece=300)]
+    solved = solve_pieces(recording, face, layout, settings=SolveSettings(neutral=0.33), piece=300)
+    held = [tracemalloc.get_traced_memory()[0] for _ in solved]
     tracemalloc.stop()
     assert len(held) == 16
     assert held[-1] - held[0] < 0.1 * size

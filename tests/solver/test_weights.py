@@ -16,8 +16,9 @@ from signface.face.layout_files import read_layout
 from signface.face.mesh import Mesh
 from signface.face.model import FaceModel
 from signface.face.subdivision import subdivide
+from signface.settings.solve import METHODS
 from signface.solver.bounds import AT_REST, SMOOTHING, holding_curvature, holding_energy, holding_slope, released
-from signface.solver.methods import METHODS, make_solver
+from signface.solver.methods import make_solver
 from signface.solver.newton import Problem, minimise, minimise_damped
 from signface.solver.thin_shell import ThinShellSolver
 

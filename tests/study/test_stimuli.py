@@ -93,7 +93,7 @@ def test_a_mistake_in_the_excerpts_is_said_with_its_line(tmp_path, row, said):
 
 
 def test_the_names_of_the_thesis_are_methods():
-    assert (parse_method("LSTS30").solver, parse_method("LSTS30").alpha) == ("thin-shell", 0.3)
+    assert (parse_method("LSTS30").method, parse_method("LSTS30").alpha) == ("thin-shell", 0.3)
     assert parse_method("LSTS70").alpha == 0.7
     assert parse_method("nnls").alpha is None
     for name in ("LSTS", "LSTS300", "FS"):

@@ -13,11 +13,11 @@ from typing import Any
 
 import pandas as pd
 
-from signface.label.labellers import SEQUENCE_NAMES
 from signface.label.vocabulary import AFFECTS
 from signface.report.evaluation import tables, words
 from signface.report.evaluation.evaluated import Evaluated
 from signface.report.pages import page_table, spelt
+from signface.settings.choices import SEQUENCE_NAMES
 
 #: Paragraphs and tables of a section.
 Content = tuple[list[str], list[dict[str, Any]]]

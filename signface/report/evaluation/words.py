@@ -12,9 +12,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from signface.evaluation.details import ENERGIES, favourite
-from signface.label.labellers import NAMES, SEQUENCE_NAMES
 from signface.label.vocabulary import AFFECTS
 from signface.report.evaluation.tables import by_protocol
+from signface.settings.choices import NAMES, SEQUENCE_NAMES
 
 KIND_WORDS = {"IE": "isolated expressions", "SE": "sequences of expressions", "EU": "expressive utterances"}
 

@@ -1,6 +1,6 @@
 """The films of a study: excerpts of takes, solved by each method and drawn.
 
-- `parse_method`, `Method`: `LSTS30` is the thin shell with alpha 0.3; the solvers' own names stand for themselves.
+- `parse_method`: `LSTS30` is the thin shell with alpha 0.3; the solvers' own names stand for themselves.
 - `solve_methods`: weights of one take by several methods, the take cleaned and adapted once.
 - `plan_films`: what `[render]` of a study asks for.
 - `render_study`: make the films.
@@ -12,7 +12,7 @@ from __future__ import annotations
 import csv
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -24,6 +24,8 @@ from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.files import whole_file
+from signface.settings.solve import METHODS, SolveSettings
+from signface.signer import Signer
 from signface.study.design import Study
 
 #: Seconds of rest shown before an expression's onset and after its end.
@@ -32,37 +34,45 @@ AROUND_S = 0.5
 CHANGE_S = 0.6
 
 
-@dataclass(frozen=True)
-class Method:
-    """How markers become weights: a solver's name and its alpha (thin shell alone)."""
+def parse_method(name: str, settings: SolveSettings | None = None) -> SolveSettings:
+    """How a method solves, by its name in the thesis (`LSTS30`: least squares, thin shell, alpha 0.30) or a solver's.
 
-    name: str
-    solver: str
-    alpha: float | None = None
-
-
-def parse_method(name: str) -> Method:
-    """A method by its name in the thesis (`LSTS30`: least squares, thin shell, alpha 0.30) or a solver's own.
+    Parameters
+    ----------
+    name : str
+    settings : SolveSettings, optional
+        Everything else; a rival of the thin shell is told nothing that only the thin shell knows.
 
     Raises
     ------
     SignfaceError
         No method has this name.
-    """
-    from signface.solver.methods import METHODS
 
+    Examples
+    --------
+    >>> parse_method("LSTS30").alpha
+    0.3
+    """
+    settings = SolveSettings() if settings is None else settings
     match = re.fullmatch(r"LSTS(\d{2,3})", name)
     if match and int(match[1]) <= 100:
-        return Method(name, "thin-shell", int(match[1]) / 100)
+        return settings.changed(method="thin-shell", alpha=int(match[1]) / 100)
+    if name == "thin-shell":
+        return settings.changed(method=name, alpha=None)
     if name in METHODS:
-        return Method(name, name)
+        return settings.changed(method=name, alpha=None, sparsity=None, head_slack=None, slip=None)
     raise SignfaceError(
         f"no method is called {name!r}", hint=f"write LSTS30 for alpha 0.3, or one of {', '.join(METHODS)}"
     )
 
 
 def solve_methods(
-    take: Any, face: FaceModel, layout: MarkerLayout, methods: Sequence[Method], *, neutral: str | float = "auto"
+    take: Any,
+    face: FaceModel,
+    layout: MarkerLayout,
+    methods: Mapping[str, SolveSettings],
+    *,
+    signer: Signer | None = None,
 ) -> dict[str, Descriptors]:
     """Weights of a take by each method; the take is cleaned and adapted once.
 
@@ -70,24 +80,29 @@ def solve_methods(
     ----------
     take : Take
     face, layout
-    methods : sequence of Method
-    neutral : float or "auto"
-        Time of a neutral face, seconds.
+    methods : mapping of name to SolveSettings
+        They differ in how displacements become weights; what comes before is as the first of them says. Creep is taken
+        away only where it says so: rivals are compared on the same displacements.
+    signer : Signer, optional
+        Whose take it is; their own bases serve the thin shell.
 
     Raises
     ------
     SignfaceError
-        As `signface.solver.solving.solve_take`.
+        As `signface.solver.solving.solve`.
     """
     from signface.solver.methods import make_solver
     from signface.solver.solving import prepare_take
 
-    prepared = prepare_take(take, face, layout, neutral=neutral)
-    found = {}
-    for method in methods:
-        solution = make_solver(method.solver, face, prepared.layout, alpha=method.alpha).solve(prepared.displacements)
-        found[method.name] = prepared.described(face, solution, prepared.note, f"solve {method.name}")
-    return found
+    first = next(iter(methods.values()))
+    prepared = prepare_take(take, face, layout, settings=first.changed(creep=bool(first.creep)), signer=signer)
+    results = {}
+    for name, how in methods.items():
+        bases = prepared.preparation.signer_bases if how.method == "thin-shell" else None
+        solver = make_solver(how.method, face, prepared.layout, signer_bases=bases, **how.solver_options)
+        solution = solver.solve(prepared.displacements)
+        results[name] = prepared.described(face, solution, prepared.note, f"solve {name}")
+    return results
 
 
 @dataclass(frozen=True)
@@ -106,7 +121,7 @@ class Look:
 
     Parameters
     ----------
-    method : Method or None
+    method : SolveSettings or None
         Solve the take; or
     weights : Path or None
         a folder of weights files, named by excerpt or by take; or
@@ -116,7 +131,7 @@ class Look:
         Skin of one colour.
     """
 
-    method: Method | None = None
+    method: SolveSettings | None = None
     weights: Path | None = None
     videos: Path | None = None
     colour: tuple[float, float, float] | None = None
@@ -233,17 +248,33 @@ def _look(folder: Path, name: str, row: Mapping) -> Look:
         raise SignfaceError(f"{where} needs one of solver, weights, videos", file=folder / "study.toml")
     if given == ["solver"]:
         alpha = row.get("alpha")
-        return Look(method=Method(name, str(row["solver"]), None if alpha is None else float(alpha)), colour=skin)
+        how = SolveSettings.from_dict({"method": row["solver"], "alpha": alpha}, file=folder / "study.toml")
+        return Look(method=how, colour=skin)
     place = folder / str(row[given[0]])
     return Look(weights=place, colour=skin) if given == ["weights"] else Look(videos=place)
 
 
-def render_study(films: StudyFilms, *, show: Callable[[Iterable], Iterable] = iter) -> int:
+def _under(settings: SolveSettings | None, method: SolveSettings) -> SolveSettings:
+    """What a study says of a method, and for everything else what the laboratory says."""
+    return method if settings is None else settings.changed(method=method.method, alpha=method.alpha)
+
+
+def render_study(
+    films: StudyFilms,
+    *,
+    settings: SolveSettings | None = None,
+    signer: Signer | None = None,
+    show: Callable[[Iterable], Iterable] = iter,
+) -> int:
     """Make every film; the number of films.
 
     Parameters
     ----------
     films : StudyFilms
+    settings : SolveSettings, optional
+        How takes are solved, but for the face, layout, method and alpha, which the study states.
+    signer : Signer, optional
+        Whose takes they are.
     show : callable
         Wraps the list of films, for a progress bar.
 
@@ -258,13 +289,13 @@ def render_study(films: StudyFilms, *, show: Callable[[Iterable], Iterable] = it
     from signface.takes.reading import read_take
 
     face = read_face(films.face)
-    methods = {plan.look.method.name: plan.look.method for plan in films.plans if plan.look.method is not None}
+    methods = {plan.method: _under(settings, plan.look.method) for plan in films.plans if plan.look.method is not None}
 
     @cache
     def solved(file: Path) -> dict[str, Descriptors]:
         take = read_take(file)
         layout = choose_layout(take.labels, face) if films.layout is None else read_layout(films.layout, face)
-        return solve_methods(take, face, layout, list(methods.values()))
+        return solve_methods(take, face, layout, methods, signer=signer)
 
     @cache
     def avatar(colour: tuple[float, float, float] | None) -> Avatar:
@@ -296,8 +327,7 @@ def render_study(films: StudyFilms, *, show: Callable[[Iterable], Iterable] = it
             if look.weights is not None:
                 descriptors, whole = weights_file(look.weights, excerpt)
             else:
-                assert look.method is not None
-                descriptors, whole = solved(excerpt.take)[look.method.name], True
+                descriptors, whole = solved(excerpt.take)[plan.method], True
             _same_bases(descriptors, face)
             times = {"start_s": excerpt.start_s, "end_s": excerpt.end_s} if whole else {}
             write_film(

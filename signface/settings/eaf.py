@@ -7,14 +7,10 @@ import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from signface.errors import SignfaceError
 from signface.files import shipped
-from signface.settings import Settings, option
-
-if TYPE_CHECKING:
-    from signface.elan.mapping import Mapping
+from signface.settings.base import Settings, option
 
 
 @dataclass(frozen=True)
@@ -44,13 +40,14 @@ class EafOptions(Settings):
     )
     channels: str | None = option(
         None,
-        help="also write the further channels, by the thresholds of a .toml or the shipped ones (default)",
+        help="also brows, eyes, gaze, nose, mouth, cheeks, head and intensity; FILE holds other thresholds",
         metavar="FILE",
+        bare="default",
         path=True,
     )
     doubtful: float | None = option(
         None,
-        help="also write a tier of the segments whose confidence is below this",
+        help="also a tier with the segments whose confidence is below this, 0 to 1",
         kind=float,
         metavar="CONFIDENCE",
     )
@@ -62,21 +59,6 @@ class EafOptions(Settings):
         if self.doubtful is not None and not 0 <= self.doubtful <= 1:
             raise SignfaceError(f"doubtful is a confidence from 0 to 1, not {self.doubtful:g}")
 
-    @property
-    def rules(self) -> Mapping:
-        """The rules of the mapping file; none where there is no file.
-
-        Raises
-        ------
-        SignfaceError
-            The file is missing or no mapping.
-        """
-        if self.mapping is None:
-            return {}
-        from signface.elan.mapping import read_mapping
-
-        return read_mapping(self.mapping)
-
     def absolute(self) -> EafOptions:
         """The options with absolute paths, for processes that stand in another folder."""
         shipped_name = self.channels in _thresholds()
@@ -84,7 +66,7 @@ class EafOptions(Settings):
         return self.changed(**{name: os.path.abspath(file) for name, file in files.items()})
 
     @property
-    def digest(self) -> str:
+    def content_digest(self) -> str:
         """SHA-256 of all that they decide, with the content of the files in place of their names.
 
         Raises

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from signface.errors import SignfaceError
-from signface.label.choices import AGGREGATES, FEATURES, NORMALISATIONS
-from signface.label.labellers import NAMES, SEQUENCE_NAMES
-from signface.settings import Settings, option
+from signface.settings.base import Settings, option
+from signface.settings.choices import AGGREGATES, FEATURES, NAMES, NORMALISATIONS, SEQUENCE_NAMES
 
 
 @dataclass(frozen=True)

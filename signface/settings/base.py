@@ -4,9 +4,7 @@
   laboratory's TOML call them; validated once, when it is made.
 - `option`: a field of one.
 
-The decisions themselves stand in their rooms: `signface.solve_settings.SolveSettings`,
-`signface.learn.settings.TrainingSettings`, `signface.elan.options.EafOptions`. `signface.laboratory` reads them from a
-TOML.
+The decisions: `solve.SolveSettings`, `training.TrainingSettings`, `eaf.EafOptions`; `laboratory` reads a TOML of them.
 """
 
 from __future__ import annotations
@@ -31,6 +29,7 @@ def option(
     flag: str | None = None,
     metavar: str | None = None,
     path: bool = False,
+    bare: str | None = None,
     default_factory: Any = MISSING,
 ) -> Any:
     """A field of a `Settings`, with what a door must know of it.
@@ -51,8 +50,18 @@ def option(
     path : bool
         A path: in a TOML it is relative to the TOML's folder. Where `choices` or shipped names exist, a name that is
         no file there stays a name.
+    bare : str, optional
+        What the option stands for on the command line when no value follows it.
     """
-    about = {"help": help, "kind": kind, "choices": tuple(choices), "flag": flag, "metavar": metavar, "path": path}
+    about = {
+        "help": help,
+        "kind": kind,
+        "choices": tuple(choices),
+        "flag": flag,
+        "metavar": metavar,
+        "path": path,
+        "bare": bare,
+    }
     if default_factory is not MISSING:
         return field(default_factory=default_factory, metadata=about)
     return field(default=default, metadata=about)
@@ -82,7 +91,9 @@ class Settings:
         if kind is not None and (not isinstance(value, kind) or (kind is not bool and isinstance(value, bool))):
             raise SignfaceError(f"{item.name} is no {_WORDS.get(kind, kind.__name__)}: {value!r}")
         if choices and value not in choices:
-            raise SignfaceError(f"{item.name} is none of {', '.join(choices)}: {value!r}")
+            close = difflib.get_close_matches(str(value), choices, n=1)
+            hint = f"did you mean {close[0]}" if close else f"choose one of {', '.join(choices)}"
+            raise SignfaceError(f"no {item.name} is called {value!r}", hint=hint)
         return value
 
     def as_dict(self) -> dict[str, Any]:

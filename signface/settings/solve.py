@@ -5,10 +5,12 @@ It stands at the top of the package because descriptors and models carry it.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from signface.errors import SignfaceError
-from signface.settings import Settings, option
+from signface.settings.base import Settings, option
 
 #: name: what it is, for `--help` and reports.
 METHODS = {
@@ -37,7 +39,7 @@ class SolveSettings(Settings):
     See Also
     --------
     signface.signer.Signer : who signs, with bases and level of their own.
-    signface.settings.read_settings : the settings of a laboratory's TOML.
+    signface.settings.laboratory.read_settings : the settings of a laboratory's TOML.
 
     Examples
     --------
@@ -119,7 +121,7 @@ class SolveSettings(Settings):
         for name in ("sparsity", "head_slack", "slip", "short_gap_s", "long_gap_s", "cutoff_hz"):
             value = getattr(self, name)
             if value is not None and not 0 <= value < float("inf"):
-                raise SignfaceError(f"{name} is 0 or more, not {value:g}")
+                raise SignfaceError(f"{name} must be 0 or more, not {value:g}")
 
     @property
     def solver_options(self) -> dict[str, float]:
@@ -132,11 +134,20 @@ class SolveSettings(Settings):
         """Whether creep is taken away: by default for the thin shell, and not for its rivals."""
         return self.method == "thin-shell" if self.creep is None else self.creep
 
-    def differences(self, other: SolveSettings) -> list[str]:
-        """What would give other weights under `other`, in words; not whose take it is: layout and neutral frame."""
-        ours, theirs = self.as_dict(), other.as_dict()
+    def differences(self, other: Mapping[str, Any]) -> list[str]:
+        """What would give other weights under other settings, given as plain values; in words.
+
+        Layout and neutral frame are the take's own, and faces are told apart by their bases.
+
+        Examples
+        --------
+        >>> SolveSettings(alpha=0.3).differences(SolveSettings().as_dict())
+        ['alpha 0.3 instead of the usual']
+        """
+        takes_own = ("face", "layout", "neutral")
+        words = {name: "the usual" if value is None else value for name, value in other.items()}
         return [
-            f"{name} {theirs[name]} instead of {ours[name]}"
-            for name in ours
-            if name not in ("layout", "neutral") and ours[name] != theirs[name]
+            f"{name} {'the usual' if value is None else value} instead of {words[name]}"
+            for name, value in self.as_dict().items()
+            if name not in takes_own and name in other and other[name] != value
         ]

@@ -2,8 +2,7 @@
 
 - `FEATURES`, `NORMALISATIONS`: what it sees of a take (`signface.label.variants`).
 - `AGGREGATES`: how a segment gets its label (`signface.label.labelling`).
-
-The classifiers themselves are named in `signface.label.labellers`.
+- `NAMES`, `SEQUENCE_NAMES`: the classifiers (`signface.label.labellers`, `signface.sequence`).
 """
 
 from __future__ import annotations
@@ -25,4 +24,22 @@ NORMALISATIONS = {
 AGGREGATES = {
     "mean": "the label of the segment's mean descriptor (thesis, eq. 4.6)",
     "frames": "the label with the highest mean log probability over the segment's frames",
+}
+
+#: Classifiers of frames. name: what it is.
+NAMES = {
+    "knn1": "the nearest training frame",
+    "knn3": "the three nearest training frames",
+    "svm-linear": "support vector machine, linear kernel",
+    "svm-rbf": "support vector machine, Gaussian kernel",
+    "forest": "random forest",
+}
+
+#: Sequence models, which find boundaries and labels at once. name: what it is.
+SEQUENCE_NAMES = {
+    "net-hsmm": "neural network on frames, decoded by a hidden semi-Markov model",
+    "forest-viterbi": "random forest on frames, decoded by Viterbi's algorithm through a transition state",
+    "hmm": "hidden Markov model with Gaussian frames",
+    "crf": "linear-chain conditional random field",
+    "gru": "recurrent network, decoded by a hidden semi-Markov model",
 }

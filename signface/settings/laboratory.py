@@ -12,11 +12,11 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from signface.elan.options import EafOptions
 from signface.errors import SignfaceError
-from signface.learn.settings import TrainingSettings
-from signface.settings import Settings
-from signface.solve_settings import SolveSettings
+from signface.settings.base import Settings
+from signface.settings.eaf import EafOptions
+from signface.settings.solve import SolveSettings
+from signface.settings.training import TrainingSettings
 
 
 @dataclass(frozen=True)
