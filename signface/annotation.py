@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from signface.content import Content
 from signface.descriptors import Descriptors
 from signface.signer import Signer
 
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Annotation:
+class Annotation(Content):
     """Everything that was found in one take. `print` says it in plain words, on one line.
 
     Parameters
@@ -76,12 +77,17 @@ class Annotation:
     model: str
     channels: Mapping[str, ChannelEvents] | None = None
     signer: Signer = field(default_factory=Signer)
-    card: Card | None = None
+    card: Card | None = field(default=None, compare=False)
 
     @property
     def name(self) -> str:
         """The take's name."""
         return self.descriptors.name
+
+    @property
+    def settings(self) -> SolveSettings | None:
+        """How the take was solved; None where it was not (weights of a phone), or nobody knows."""
+        return self.descriptors.settings
 
     @cached_property
     def curves(self) -> pd.DataFrame:

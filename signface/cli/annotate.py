@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.into is not None and len(takes) > 1:
         raise SignfaceError("--into names one file", hint="annotate the takes one by one")
     options = settings_from(arguments, EafOptions)
-    if arguments.into is not None and options.template is not None:
+    if arguments.into is not None and getattr(arguments, "eaf_template", None) is not None:
         raise SignfaceError("--into and --template exclude each other", hint="the file of --into has its own tiers")
     files = [arguments.into] if arguments.into is not None else output_files(takes, arguments.output, ".eaf")
     if options.mapping is not None:  # one that is none is said before anything is solved

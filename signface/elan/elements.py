@@ -25,12 +25,12 @@ LANGUAGE = {
     "LANG_DEF": "http://cdb.iso.org/lg/CDB-00138502-001",
     "LANG_LABEL": "English (eng)",
 }
-#: The four stereotypes, in ELAN's own words.
+#: The four stereotypes, in ELAN's own words and spelling.
 CONSTRAINTS = {
     "Time_Subdivision": "Time subdivision of parent annotation's time interval, "
     "no time gaps allowed within this interval",
     "Symbolic_Subdivision": "Symbolic subdivision of a parent annotation. "
-    "Annotations referring to the same parent are ordered",
+    "Annotations refering to the same parent are ordered",
     "Symbolic_Association": "1-1 association with a parent annotation",
     "Included_In": "Time alignable annotations within the parent annotation's time interval, gaps are allowed",
 }

@@ -36,6 +36,13 @@ def correct(path: Path, old: str, new: str) -> None:
     path.write_text(text.replace(wrong, f"<ANNOTATION_VALUE>{new}</ANNOTATION_VALUE>", 1), "utf-8")
 
 
+def test_stereotypes_are_described_in_elans_own_spelling(tmp_path):
+    """A document that differs from ELAN's in this would look changed when ELAN saves it."""
+    write_eaf(labelled(), tmp_path / "take.eaf")
+    constraint = root_of(tmp_path / "take.eaf").find("CONSTRAINT[@STEREOTYPE='Symbolic_Subdivision']")
+    assert constraint.get("DESCRIPTION").endswith("Annotations refering to the same parent are ordered")
+
+
 def test_what_is_written_is_valid_under_two_validators(tmp_path):
     path = tmp_path / "take.eaf"
     write_eaf(labelled(), path, signer="S1", video=tmp_path / "take.mp4", properties={"model": "forest"})

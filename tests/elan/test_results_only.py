@@ -33,6 +33,16 @@ def annotation(mini):
     return sf.annotate(take, sf.load_model("default"), signer=sf.Signer("M1"), channels=True)
 
 
+def test_two_annotations_of_one_take_are_equal_and_name_their_solve(annotation, mini):
+    again = sf.annotate(
+        sf.read_take(mini.takes[0].path), sf.load_model("default"), signer=sf.Signer("M1"), channels=True
+    )
+    assert again == annotation
+    assert hash(again) == hash(annotation)
+    assert again != sf.annotate(annotation.descriptors, sf.load_model("default"))
+    assert again.settings == sf.SolveSettings()
+
+
 def same_files(first: Path, second: Path) -> None:
     names = sorted(file.name for file in first.iterdir())
     assert names == sorted(file.name for file in second.iterdir())
@@ -57,6 +67,16 @@ def test_annotate_and_write_equals_the_command(door, annotation, mini, tmp_path)
     words = [str(mini.takes[0].path), *place, "--signer", "M1", "--channels", "--doubtful", "0.9"]
     assert main(["annotate", *words]) == 0
     same_files(script.parent, command.parent)
+
+
+def test_a_template_of_the_laboratory_does_not_stand_in_the_way_of_into(annotation, mini, tmp_path):
+    sf.write_eaf(annotation.segments, tmp_path / "lab.etf", signer="other")
+    sf.write_eaf(annotation.segments, tmp_path / "take.eaf", signer="other")
+    (tmp_path / "lab.toml").write_text('[eaf]\ntemplate = "lab.etf"\n')
+    into = ["annotate", str(mini.takes[0].path), "--into", str(tmp_path / "take.eaf"), "--signer", "M1"]
+    assert main([*into, "--settings", str(tmp_path / "lab.toml")]) == 0
+    assert {"affect@other", "affect@M1"} <= set(sf.read_tiers(tmp_path / "take.eaf"))
+    assert main([*into, "--template", str(tmp_path / "lab.etf")]) == 2
 
 
 def test_with_a_date_the_same_annotation_gives_the_same_bytes(annotation, tmp_path):
