@@ -1,7 +1,7 @@
 """What is counted in frames: their times, runs of them, states from curves, means over stretches of time.
 
 - `Timed`: what has frames at times; `TimedArrays` can be cut in time.
-- `runs`: where something holds without a break.
+- `runs`: where something holds without a break; `stretches`: where a value stays.
 - `hysteresis`, `bridge`, `long_enough`: from a curve to the stretches in which something is on.
 - `Means`: means of a signal over any stretches of time.
 """
@@ -133,6 +133,23 @@ def runs(mask: np.ndarray) -> np.ndarray:
     """
     edges = np.diff(np.concatenate(([0], mask.astype(np.int8), [0])))
     return np.column_stack((np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)))
+
+
+def stretches(values: np.ndarray) -> np.ndarray:
+    """(R, 2) first frame and frame after the last of each stretch of one value; together all frames.
+
+    Parameters
+    ----------
+    values : (F,) array
+
+    Examples
+    --------
+    >>> stretches(np.array([3, 3, 1, 1, 1, 3])).tolist()
+    [[0, 2], [2, 5], [5, 6]]
+    """
+    changes = np.flatnonzero(values[1:] != values[:-1]) + 1
+    edges = np.concatenate(([0], changes, [len(values)])) if len(values) else np.zeros(1, int)
+    return np.column_stack((edges[:-1], edges[1:]))
 
 
 def hysteresis(signal: np.ndarray, on: float, off: float) -> np.ndarray:

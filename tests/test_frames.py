@@ -1,5 +1,6 @@
 """Frames in time: cutting a take, and the runs of a mask."""
 
+import itertools
 import math
 
 import numpy as np
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
+from signface.frames import runs, stretches
 from signface.takes.recording import TakeFile
 from signface.takes.take import Take
 
@@ -88,3 +90,11 @@ def test_a_recording_on_disk_is_cut_without_being_read():
     assert part.whole() == take.between(3.5, 4.5).between(3.6, 4.4)
     np.testing.assert_array_equal(part.frames(0, 1000, 3), take.positions[30:70:3])
     assert max(end for _, end in asked) == 70
+
+
+@given(st.lists(st.sampled_from([0, 1, 2]), max_size=40))
+def test_stretches_are_the_groups_of_equal_neighbours(values):
+    groups = [(value, len(list(group))) for value, group in itertools.groupby(values)]
+    array = np.array(values, dtype=int)
+    assert [(array[begin], end - begin) for begin, end in stretches(array)] == groups
+    assert runs(array == 1).tolist() == [span for span in stretches(array).tolist() if array[span[0]] == 1]

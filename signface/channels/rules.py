@@ -23,7 +23,7 @@ from signface.channels.head import head_events
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.files import shipped
-from signface.frames import bridge, hysteresis, long_enough
+from signface.frames import bridge, hysteresis, long_enough, stretches
 from signface.segmentation.segments import Segments
 
 #: Keys that a channel's table holds besides its values.
@@ -192,11 +192,9 @@ def _runs(label: np.ndarray, shortest: float) -> Iterator[tuple[int, int, int]]:
 
     Fragments appear where two values that are each long enough overlap a little.
     """
-    edges = np.flatnonzero(np.diff(label)) + 1
-    starts = [0, *edges.tolist()] if len(label) else []
-    runs = [[start, end, int(label[start])] for start, end in zip(starts, [*starts[1:], len(label)])]
     merged: list[list[int]] = []
-    for start, end, code in runs:
+    for start, end in stretches(label).tolist():
+        code = int(label[start])
         follows = merged and merged[-1][1] == start and merged[-1][2] >= 0
         if follows and (merged[-1][2] == code or (code >= 0 and end - start < shortest)):
             merged[-1][1] = end

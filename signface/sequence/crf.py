@@ -16,6 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from signface.descriptors import Descriptors
+from signface.frames import runs, stretches
 from signface.segmentation.segments import Segments
 from signface.sequence.take_labeller import HALVES, TakeLabeller, shares, standardised
 
@@ -72,8 +73,7 @@ class ChainLabeller(TakeLabeller):
         del gathered
         rows, codes, lengths = [], [], []
         for features, state in zip(seen, states, strict=True):
-            marks = np.flatnonzero(np.diff(state != "", prepend=False, append=False))
-            for first, last in marks.reshape(-1, 2):
+            for first, last in runs(state != ""):
                 rows.append(standardised(features[first:last], self.mean_, self.scale_))
                 codes.append(np.array([order[name] for name in state[first:last]]))
                 lengths.append(last - first)
@@ -142,8 +142,7 @@ class ChainLabeller(TakeLabeller):
         for frame in range(len(scores) - 1, 0, -1):
             states[frame - 1] = came[frame, states[frame]]
         said = np.where(part[states] == 0, label[states], -1)
-        starts = [0, *(np.flatnonzero(np.diff(said)) + 1).tolist()]
-        return [(first, last, int(said[first])) for first, last in zip(starts, [*starts[1:], len(said)], strict=True)]
+        return [(first, last, int(said[first])) for first, last in stretches(said).tolist()]
 
 
 def log_likelihood(

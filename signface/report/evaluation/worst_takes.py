@@ -184,9 +184,9 @@ def _boundaries(reference: pd.DataFrame, found: pd.DataFrame) -> tuple[_Lonely, 
 
 
 def _runs(boundaries: np.ndarray, matched: Sequence[int]) -> _Lonely:
-    lonely = np.setdiff1d(np.arange(len(boundaries)), np.asarray(matched, dtype=int))
-    runs = np.split(lonely, np.flatnonzero(np.diff(lonely) > 1) + 1) if len(lonely) else []
-    return _Lonely(tuple(boundaries[run] for run in runs), len(boundaries))
+    lonely = np.ones(len(boundaries), bool)
+    lonely[np.asarray(matched, dtype=int)] = False
+    return _Lonely(tuple(boundaries[start:end] for start, end in runs(lonely)), len(boundaries))
 
 
 def _confusions(parts: pd.DataFrame) -> list[tuple[float, str]]:
