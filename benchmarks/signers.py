@@ -120,7 +120,7 @@ def without_creep(
 ) -> np.ndarray:
     """(F, P, 3) displacements of a whole take at `RATE` with the creep of its markers taken away."""
     step = round(RATE / RATE_HZ)
-    creep = Creep(displacements[::step], RATE / step, face, layout, signer_bases=signer_bases)
+    creep = Creep(face, layout, signer_bases=signer_bases).fit(displacements[::step], RATE / step)
     return displacements - creep.at(np.arange(len(displacements)) / step)
 
 

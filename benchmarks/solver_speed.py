@@ -70,7 +70,8 @@ def speed(face: FaceModel, layout: MarkerLayout, frames: np.ndarray) -> dict[str
     for start in rng.integers(0, len(frames) - 40, 200):
         holes[start : start + 40, rng.integers(0, frames.shape[1], 2)] = np.nan
     gaps = best_of(3, lambda: solver.solve(holes)) / len(frames) * 1e6
-    pushed = np.array([_seconds(lambda frame=frame: solver.push(frame)) for frame in frames[:3000]])
+    stream = solver.stream()
+    pushed = np.array([_seconds(lambda frame=frame: stream.push(frame)) for frame in frames[:3000]])
     neutral = layout.points(face)
     adaptation = MorphologicalAdaptation(neutral, 1.1 * neutral)
     adapt = best_of(3, lambda: adaptation.transform(frames + neutral)) / len(frames) * 1e6

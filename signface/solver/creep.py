@@ -14,6 +14,7 @@ import numpy as np
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.solver.thin_shell import ThinShellSolver
+from signface.takes.stages import Block, Stage, View
 
 #: Frames per second that creep is estimated from.
 RATE_HZ = 5.0
@@ -28,18 +29,16 @@ NONE_S = 0.3
 TURNS = 8
 
 
-class Creep:
-    """How far the markers of a take have crept since its neutral frame.
+class Creep(Stage):
+    """Takes away how far the markers of a take have crept since its neutral frame.
+
+    It stands behind `signface.solver.displacements.Displacements`.
 
     Parameters
     ----------
-    displacements : (K, P, 3) array
-        Evenly spaced frames of the take, as `signface.solver.preparation.Preparation.frames` gives them.
-    rate : float
-        How many of them there are in a second; see `RATE_HZ`.
     face : FaceModel
     layout : MarkerLayout
-        The one that `displacements` follows.
+        The one that displacements follow.
     signer_bases : (N, P, 3) array, optional
         See `ThinShellSolver`.
 
@@ -47,42 +46,74 @@ class Creep:
     ----------
     size_mm : float
         Root mean square of the creep of a marker over the take, in the displacements' unit.
+
+    Examples
+    --------
+    A face at rest whose markers have all crept 0.2 mm upwards:
+
+    >>> import signface as sf
+    >>> face = sf.read_face("default")
+    >>> layout = sf.read_layout("default-40", face)
+    >>> displacements = np.zeros((50, 40, 3)) + (0.0, 0.2, 0.0)
+    >>> creep = Creep(face, layout).fit(displacements, rate=RATE_HZ)
+    >>> creep.at(np.array([25.0])).shape, 0.1 < creep.size_mm < 0.25
+    ((1, 40, 3), True)
     """
 
-    def __init__(
-        self,
-        displacements: np.ndarray,
-        rate: float,
-        face: FaceModel,
-        layout: MarkerLayout,
-        *,
-        signer_bases: np.ndarray | None = None,
-    ) -> None:
+    def __init__(self, face: FaceModel, layout: MarkerLayout, *, signer_bases: np.ndarray | None = None) -> None:
+        self._face, self._layout, self._signer_bases = face, layout, signer_bases
+
+    def learn(self, view: View) -> None:
+        """The creep, from displacements some times a second."""
+        step = max(1, round(view.rate / RATE_HZ))
+        self._pace = view.rate / step / view.recording.rate
+        self.fit(view.every(step).positions, view.rate / step)
+
+    def fit(self, displacements: np.ndarray, rate: float) -> Creep:
+        """Estimate the creep.
+
+        Parameters
+        ----------
+        displacements : (K, P, 3) array
+            Evenly spaced frames of the take.
+        rate : float
+            How many of them there are in a second; see `RATE_HZ`.
+        """
         from scipy.ndimage import gaussian_filter1d
 
-        solver = ThinShellSolver(face, layout, signer_bases=signer_bases)
+        solver = ThinShellSolver(self._face, self._layout, signer_bases=self._signer_bases)
         markers = solver.markers
         rest = REST**2 * markers.scale / markers.n_markers
         seen = np.isfinite(displacements).all(axis=2)
-        self._rate, self._crept = rate, np.zeros_like(displacements)
+        self._crept = np.zeros_like(displacements)
 
         def window(values: np.ndarray) -> np.ndarray:
             return gaussian_filter1d(values, WINDOW_S * rate, axis=0, mode="constant", truncate=3.0)
 
         for _ in range(TURNS if seen.any() else 0):
             weights = np.nan_to_num(solver.solve(displacements - self._crept).weights)
-            shown = (weights @ markers.matrix.T).reshape(displacements.shape)
-            moved = np.einsum("kpd,kpd->k", shown, shown) / markers.n_markers
+            explained = (weights @ markers.matrix.T).reshape(displacements.shape)
+            moved = np.einsum("kpd,kpd->k", explained, explained) / markers.n_markers
             trust = seen / (1.0 + moved / rest)[:, None]
-            left = np.where(seen[:, :, None], displacements - shown, 0.0)
+            left = np.where(seen[:, :, None], displacements - explained, 0.0)
             # The window has mass 1: so many seconds in it are such a share of it.
             none = NONE_S / (np.sqrt(2.0 * np.pi) * WINDOW_S)
             self._crept = window(trust[:, :, None] * left) / (window(trust) + none)[:, :, None]
         self.size_mm = float(np.sqrt((self._crept**2).sum(axis=2).mean())) if len(self._crept) else 0.0
+        return self
 
     def at(self, frames: np.ndarray) -> np.ndarray:
-        """(F, P, 3) creep at (F,) places among the frames it was estimated from, which may lie between two of them."""
+        """(F, P, 3) creep at (F,) numbers of the frames it was estimated from, which may lie between two of them."""
         before = np.clip(np.floor(frames).astype(int), 0, len(self._crept) - 1)
         after = np.minimum(before + 1, len(self._crept) - 1)
         share = np.clip(frames - before, 0.0, 1.0)[:, None, None]
         return (1.0 - share) * self._crept[before] + share * self._crept[after]
+
+    def apply(self, block: Block) -> Block:
+        """The displacements without creep."""
+        return block.changed(block.positions - self.at(np.asarray(block.frames) * self._pace))
+
+    @property
+    def note(self) -> str:
+        """How much creep there is."""
+        return f"creep of {self.size_mm:.2f} mm taken away"

@@ -145,8 +145,6 @@ class ThinShellSolver:
         self._full = 0.5 * (full + full.T)
         self._inverse = _inverse(self._full)
         self._whole = self._problem(np.ones(self.markers.n_markers, dtype=bool))
-        self._pattern, self._pushed = np.ones(self.markers.n_markers, dtype=bool), self._whole
-        self._last: np.ndarray | None = None
 
     def energy(self, weights: np.ndarray, displacements: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
         """(F,) energy of (F, N) weights for (F, P, 3) displacements: what `solve` minimises.
@@ -224,27 +222,23 @@ class ThinShellSolver:
             threads=self.threads,
         )
 
-    def push(self, frame: np.ndarray) -> Solution:
-        """Weights of one frame of a live capture, started from the frame pushed before it.
+    def stream(self) -> Stream:
+        """A live capture to be solved frame by frame; several may share one solver.
 
-        Parameters
-        ----------
-        frame : (P, 3) array
-            Displacements of the face markers, as for `solve`.
+        See Also
+        --------
+        solve : all frames of a recording.
 
-        Returns
-        -------
-        Solution
-            Of one frame; the same weights as `solve` gives.
+        Examples
+        --------
+        >>> import signface as sf
+        >>> face = sf.read_face("default")
+        >>> solver = ThinShellSolver(face, sf.read_layout("default-40", face))
+        >>> stream = solver.stream()
+        >>> stream.push(np.zeros((40, 3))).weights.round(6).max().item()
+        0.0
         """
-        rows, present = self.markers.checked(np.asarray(frame, dtype=np.float64)[None])
-        if not present.any():
-            return Solution(np.full((1, len(self.names)), np.nan), np.full(1, np.nan))
-        if (present[0] != self._pattern).any():
-            self._pattern, self._pushed = present[0], self._problem(present[0])
-        weights, residual = self._minimise(rows, self._pushed, self._last)
-        self._last = weights[0, self._whole.places]
-        return Solution(weights, residual)
+        return Stream(self)
 
     def uncertainty(self, weights: np.ndarray, marker_error: float | np.ndarray) -> np.ndarray:
         """Standard deviation of each weight, from the curvature of the energy at the optimum.
@@ -309,6 +303,43 @@ class ThinShellSolver:
             places=np.flatnonzero(observed),
             width=len(self.names),
         )
+
+
+class Stream:
+    """Frames of one live capture, each solved from the one pushed before it; made by `ThinShellSolver.stream`.
+
+    Parameters
+    ----------
+    solver : ThinShellSolver
+    """
+
+    def __init__(self, solver: ThinShellSolver) -> None:
+        self._solver = solver
+        self._pattern, self._problem = np.ones(solver.markers.n_markers, dtype=bool), solver._whole
+        self._last: np.ndarray | None = None
+
+    def push(self, frame: np.ndarray) -> Solution:
+        """Weights of one frame.
+
+        Parameters
+        ----------
+        frame : (P, 3) array
+            Displacements of the face markers, as for `ThinShellSolver.solve`.
+
+        Returns
+        -------
+        Solution
+            Of one frame; the same weights as `solve` gives.
+        """
+        solver = self._solver
+        rows, present = solver.markers.checked(np.asarray(frame, dtype=np.float64)[None])
+        if not present.any():
+            return Solution(np.full((1, len(solver.names)), np.nan), np.full(1, np.nan))
+        if (present[0] != self._pattern).any():
+            self._pattern, self._problem = present[0], solver._problem(present[0])
+        weights, residual = solver._minimise(rows, self._problem, self._last)
+        self._last = weights[0, solver._whole.places]
+        return Solution(weights, residual)
 
 
 def _rigid_motions(points: np.ndarray) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Low-pass filters without lag, for marker trajectories.
 
 - `lowpass`: a take, filtered; `butterworth` or `raised-sine`.
-- `filtered`, `reach`: the same for a piece of one, and how much must stand beside the piece.
+- `Lowpass`: the same as a stage, for any recording.
 - `raised_sine_response`: the spectral window of equation 7.1.
 """
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from signface.errors import SignfaceError
 from signface.frames import runs
+from signface.takes.stages import Block, Stage, View, run
 from signface.takes.take import Take
 
 #: Half of the power passes at this frequency. A lid closes in some 120 ms; its path keeps 99 % of its depth.
@@ -95,19 +96,6 @@ def _butterworth(signals: np.ndarray, rate: float, cutoff_hz: float) -> np.ndarr
     return longer[pad : pad + len(signals)]
 
 
-def reach(rate: float, cutoff_hz: float, method: str) -> int | None:
-    """How many frames away a filtered frame still depends on others, as far as numbers tell; None for all of them.
-
-    The Butterworth filter forgets by its poles' radius a frame. The raised-sine window cuts the spectrum of the whole
-    take, and every frame depends on every other.
-    """
-    if cutoff_hz > HIGHEST_CUTOFF * rate:
-        return 0
-    if method != "butterworth":
-        return None
-    return _forgetting(_butterworth_coefficients(rate, cutoff_hz)[1])
-
-
 def _forgetting(denominator: np.ndarray) -> int:
     """After how many frames the filter has forgotten one."""
     return int(np.ceil(np.log(FORGOTTEN) / np.log(np.abs(np.roots(denominator)).max())))
@@ -133,46 +121,76 @@ def lowpass(take: Take, *, cutoff_hz: float = CUTOFF_HZ, method: str = "butterwo
     ------
     SignfaceError
         The cutoff is not positive, or the method is unknown.
+
+    See Also
+    --------
+    signface.takes.gaps.fill_gaps : the step before.
+    raised_sine_response : the spectral window.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> take = sf.datasets.mini_take()
+    >>> smooth = lowpass(take, cutoff_hz=8.0)
+    >>> smooth.history[-1]
+    'lowpass butterworth 8 Hz'
+    >>> fastest = [np.nanmax(abs(np.diff(one.positions, 2, axis=0))) for one in (take, smooth)]
+    >>> bool(fastest[1] < fastest[0])
+    True
     """
-    _check(cutoff_hz, method)
-    return take.changed(
-        note(take.rate, cutoff_hz, method), positions=filtered(take.positions, take.rate, cutoff_hz, method)
-    )
+    return run(take, Lowpass(cutoff_hz=cutoff_hz, method=method))
 
 
-def _check(cutoff_hz: float, method: str) -> None:
-    if method not in ("butterworth", "raised-sine"):
-        raise SignfaceError(f"no filter named {method}", hint="take butterworth or raised-sine")
-    if not (np.isfinite(cutoff_hz) and cutoff_hz > 0):
-        raise SignfaceError(f"the cutoff must be positive, not {cutoff_hz} Hz")
+class Lowpass(Stage):
+    """Takes fast variations away; see `lowpass`, whose parameters and errors it has.
 
+    The Butterworth filter forgets by its poles' radius a frame, and reaches as far as numbers tell. The raised-sine
+    window cuts the spectrum of the whole take, and every frame depends on every other.
+    """
 
-def note(rate: float, cutoff_hz: float, method: str) -> str:
-    """What `lowpass` does, for the history; raises as it does."""
-    _check(cutoff_hz, method)
-    if cutoff_hz > HIGHEST_CUTOFF * rate:
-        return f"lowpass skipped: {cutoff_hz:g} Hz is too near half the rate of {rate:g} Hz"
-    return f"lowpass {method} {cutoff_hz:g} Hz"
+    alone = False
 
+    def __init__(self, *, cutoff_hz: float = CUTOFF_HZ, method: str = "butterworth") -> None:
+        if method not in ("butterworth", "raised-sine"):
+            raise SignfaceError(f"no filter named {method}", hint="take butterworth or raised-sine")
+        if not (np.isfinite(cutoff_hz) and cutoff_hz > 0):
+            raise SignfaceError(f"the cutoff must be positive, not {cutoff_hz} Hz")
+        self.cutoff_hz, self.method = cutoff_hz, method
 
-def filtered(positions: np.ndarray, rate: float, cutoff_hz: float, method: str) -> np.ndarray:
-    """(F, M, 3) positions without fast variations; see `lowpass`."""
-    positions = positions.copy()
-    if cutoff_hz > HIGHEST_CUTOFF * rate:
-        return positions
-    known = np.isfinite(positions[..., 0])
-    stretches: dict[tuple[int, int], list[int]] = {}  # markers seen in the same stretch are filtered together
-    for marker in range(known.shape[1]):
-        for begin, end in runs(known[:, marker]):
-            stretches.setdefault((int(begin), int(end)), []).append(marker)
-    for (begin, end), markers in stretches.items():
-        if end - begin < 4:
-            continue
-        signals = positions[begin:end, markers].reshape(end - begin, -1)
-        line = _line_through_ends(signals)  # passes as it is, however short the stretch
-        if method == "butterworth":
-            smooth = _butterworth(signals - line, rate, cutoff_hz)
+    def learn(self, view: View) -> None:
+        """The rate."""
+        self._rate = view.recording.rate
+        self._skipped = self.cutoff_hz > HIGHEST_CUTOFF * self._rate
+        if self._skipped:
+            self.reach = 0
+        elif self.method == "butterworth":
+            self.reach = _forgetting(_butterworth_coefficients(self._rate, self.cutoff_hz)[1])
         else:
-            smooth = _raised_sine(signals - line, rate, cutoff_hz)
-        positions[begin:end, markers] = (line + smooth).reshape(end - begin, len(markers), 3)
-    return positions
+            self.reach = None
+
+    @property
+    def note(self) -> str:
+        """The filter, or why there is none."""
+        if self._skipped:
+            return f"lowpass skipped: {self.cutoff_hz:g} Hz is too near half the rate of {self._rate:g} Hz"
+        return f"lowpass {self.method} {self.cutoff_hz:g} Hz"
+
+    def apply(self, block: Block) -> Block:
+        """The block, each stretch in which a marker is seen filtered by itself."""
+        if self._skipped:
+            return block
+        answer = _butterworth if self.method == "butterworth" else _raised_sine
+        positions = block.positions.copy()
+        known = np.isfinite(positions[..., 0])
+        stretches: dict[tuple[int, int], list[int]] = {}  # markers seen in the same stretch are filtered together
+        for marker in range(known.shape[1]):
+            for begin, end in runs(known[:, marker]):
+                stretches.setdefault((int(begin), int(end)), []).append(marker)
+        for (begin, end), markers in stretches.items():
+            if end - begin < 4:
+                continue
+            signals = positions[begin:end, markers].reshape(end - begin, -1)
+            line = _line_through_ends(signals)  # passes as it is, however short the stretch
+            smooth = line + answer(signals - line, self._rate, self.cutoff_hz)
+            positions[begin:end, markers] = smooth.reshape(end - begin, len(markers), 3)
+        return block.changed(positions)

@@ -1,7 +1,7 @@
 """Filling gaps in trajectories.
 
 - `fill_gaps`: short gaps by a spline, longer ones from the motion of the neighbouring markers.
-- `GapFiller`: the same, for a recording in pieces.
+- `GapFiller`: the same as a stage, for any recording.
 - `gap_runs`: the gaps of each marker.
 """
 
@@ -13,8 +13,8 @@ import numpy as np
 
 from signface.errors import SignfaceError
 from signface.frames import runs
-from signface.takes.recording import Recording
 from signface.takes.rigid import apply, flatness, inverse, rigid_transforms
+from signface.takes.stages import Block, Stage, View, run
 from signface.takes.take import Take
 
 #: Default limits in seconds: gaps up to the first are splined, up to the second taken from the neighbours.
@@ -92,11 +92,11 @@ class _Carriers:
         weights = (known & np.isfinite(self.rest[:, 0])).astype(float)
         poses = rigid_transforms(np.nan_to_num(self.rest), sample, weights)
         poses[weights.sum(axis=1) < 3] = np.nan
-        self.places = apply(inverse(poses), sample)  # (S, M, 3) in the head
-        self.seen = np.isfinite(self.places[..., 0])
+        self.in_head = apply(inverse(poses), sample)  # (S, M, 3) in the head
+        self.seen = np.isfinite(self.in_head[..., 0])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # markers that are never seen
-            middle = np.nanmedian(self.places[:: max(1, len(sample) // 200)], axis=0)
+            middle = np.nanmedian(self.in_head[:: max(1, len(sample) // 200)], axis=0)
         distances = np.linalg.norm(middle[:, None] - middle[None], axis=2)
         np.fill_diagonal(distances, np.inf)
         self.nearest = np.argsort(np.where(np.isfinite(distances), distances, np.inf), axis=1, kind="stable")
@@ -116,12 +116,12 @@ class _Carriers:
             return None
         if len(together) > TRAINING_FRAMES:
             together = together[np.linspace(0, len(together) - 1, TRAINING_FRAMES).astype(int)]
-        train = self.places[together][:, carriers].reshape(len(together), -1)
-        own = self.places[together, marker]
-        middle, own_middle = train.mean(axis=0), own.mean(axis=0)
+        train = self.in_head[together][:, carriers].reshape(len(together), -1)
+        carried = self.in_head[together, marker]
+        middle, carried_middle = train.mean(axis=0), carried.mean(axis=0)
         normal = (train - middle).T @ (train - middle)
         normal[np.diag_indices_from(normal)] += RIDGE_MM2 * len(together)
-        slopes = np.linalg.solve(normal, (train - middle).T @ (own - own_middle))
+        slopes = np.linalg.solve(normal, (train - middle).T @ (carried - carried_middle))
         # Over the gap the pose comes from one set of markers: it would jump where a marker comes or goes.
         steady = known.all(axis=0) & np.isfinite(self.rest[:, 0])
         steady[marker] = False
@@ -130,93 +130,72 @@ class _Carriers:
         poses = rigid_transforms(self.rest[steady], recorded[:, steady], np.ones((len(recorded), steady.sum())))
         back = inverse(poses)
         over = apply(back, recorded[:, carriers]).reshape(len(recorded), -1)
-        predicted = own_middle + (over - middle) @ slopes
+        predicted = carried_middle + (over - middle) @ slopes
         errors = apply(back[[0, -1]], recorded[[0, -1], marker][:, None])[:, 0] - predicted[[0, -1]]
         part = np.linspace(0.0, 1.0, end - begin + 2)[:, None]
         joined = predicted + (1 - part) * errors[0] + part * errors[1]  # a line in time joins the known ends
         return apply(poses[1:-1], joined[1:-1, None])[:, 0]
 
 
-class GapFiller:
-    """Fills the gaps of a recording, piece by piece; see `fill_gaps`.
+class GapFiller(Stage):
+    """Fills the gaps of a recording; see `fill_gaps`, whose parameters and errors it has."""
 
-    Parameters
-    ----------
-    recording : Recording
-        From some of its frames the filler learns how markers follow their neighbours.
-    short_s, long_s : float
+    alone = False
 
-    Attributes
-    ----------
-    reach : int
-        So many frames beside a piece decide how its gaps are filled.
-
-    Raises
-    ------
-    SignfaceError
-        A limit is negative or not a number.
-    """
-
-    def __init__(self, recording: Recording, *, short_s: float, long_s: float) -> None:
+    def __init__(self, *, short_s: float = SHORT_S, long_s: float = LONG_S) -> None:
         if not (short_s >= 0 and long_s >= 0):
             raise SignfaceError("the longest gaps to fill are given in seconds, 0 or more")
-        self._recording, self.short_s, self.long_s = recording, short_s, long_s
-        self._support = max(3, round(SUPPORT_S * recording.rate) + 1)
-        self.reach = int(np.ceil(max(short_s, long_s) * recording.rate)) + self._support + 1
+        self.short_s, self.long_s = short_s, long_s
         self._carriers: _Carriers | None = None
         self._outcomes: dict[tuple[int, int], str] = {}
 
-    def fill(self, positions: np.ndarray, first: int = 0, piece: tuple[int, int] | None = None) -> np.ndarray:
-        """(F, M, 3) positions, filled.
+    def learn(self, view: View) -> None:
+        """How far gaps are looked over. How markers follow their neighbours is learnt when a gap asks for it."""
+        self._view, self._rate = view, view.recording.rate
+        self._support = max(3, round(SUPPORT_S * self._rate) + 1)
+        self.reach = int(np.ceil(max(self.short_s, self.long_s) * self._rate)) + self._support + 1
 
-        Parameters
-        ----------
-        positions : (F, M, 3) array
-        first : int
-            Number of their first frame in the recording.
-        piece : (int, int), optional
-            The frames (of the recording) that are wanted, the others stand beside them; all by default.
-        """
-        rate = self._recording.rate
-        wanted = range(*(piece or (first, first + len(positions))))
-        given, positions = positions, positions.copy()
+    def apply(self, block: Block) -> Block:
+        """The block with its gaps filled."""
+        wanted = block.wanted or block.frames
+        first = block.frames.start
+        positions = block.positions.copy()
         missing = np.isnan(positions[..., 0])
         later: list[tuple[int, int, int]] = []
         for marker in np.flatnonzero(missing.any(axis=0)).tolist():
             for begin, end in runs(missing[:, marker]).tolist():
-                short = (end - begin) / rate <= self.short_s
-                path = _spline(given[:, marker], begin, end, self._support) if short else None
+                short = (end - begin) / self._rate <= self.short_s
+                path = _spline(block.positions[:, marker], begin, end, self._support) if short else None
                 if path is None:
                     later.append((marker, begin, end))
                 else:
                     positions[begin:end, marker] = path
-                    self._note(wanted, marker, first + begin, "splined")
+                    self._count(wanted, marker, first + begin, "splined")
         for marker, begin, end in later:
             path = None
-            if (end - begin) / rate <= self.long_s:
+            if (end - begin) / self._rate <= self.long_s:
                 path = self._learnt().fill(positions, marker, begin, end)
             if path is not None:
                 positions[begin:end, marker] = path
-            self._note(wanted, marker, first + begin, "left" if path is None else "from neighbours")
-        return positions
+            self._count(wanted, marker, first + begin, "left" if path is None else "from neighbours")
+        return block.changed(positions)
 
     def _learnt(self) -> _Carriers:
         if self._carriers is None:
-            frames = self._recording.n_frames
-            self._carriers = _Carriers(self._recording.frames(0, frames, max(1, frames // SAMPLE_FRAMES)))
+            self._carriers = _Carriers(self._view.spread(SAMPLE_FRAMES).positions)
         return self._carriers
 
-    def _note(self, wanted: range, marker: int, begin: int, outcome: str) -> None:
-        if begin in wanted:  # a gap that begins beside the piece is another piece's
+    def _count(self, wanted: range, marker: int, begin: int, outcome: str) -> None:
+        if begin in wanted:  # a gap that begins beside the wanted frames is another block's
             self._outcomes[marker, begin] = outcome
 
     @property
     def note(self) -> str:
-        """What was done until now, for the history."""
-        found = list(self._outcomes.values())
-        counts = {what: found.count(what) for what in ("splined", "from neighbours", "left")}
-        said = ", ".join(f"{number} {what}" for what, number in counts.items() if number)
-        return f"fill_gaps up to {self.short_s:g} and {self.long_s:g} s: {said or 'no gaps'}"
+        """How many gaps were filled until now, and how."""
+        outcomes = list(self._outcomes.values())
+        counts = {outcome: outcomes.count(outcome) for outcome in ("splined", "from neighbours", "left")}
+        words = ", ".join(f"{number} {outcome}" for outcome, number in counts.items() if number)
+        return f"fill_gaps up to {self.short_s:g} and {self.long_s:g} s: {words or 'no gaps'}"
 
 
 def fill_gaps(take: Take, *, short_s: float = SHORT_S, long_s: float = LONG_S) -> Take:
@@ -236,7 +215,22 @@ def fill_gaps(take: Take, *, short_s: float = SHORT_S, long_s: float = LONG_S) -
     ------
     SignfaceError
         A limit is negative or not a number.
+
+    See Also
+    --------
+    gap_runs : where gaps are.
+    signface.takes.filtering.lowpass : the next step.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> take = sf.datasets.mini_take()
+    >>> positions = take.positions.copy()
+    >>> positions[100:105, 7] = np.nan
+    >>> filled = fill_gaps(take.changed("cut", positions=positions))
+    >>> filled.history[-1]
+    'fill_gaps up to 0.05 and 0.5 s: 3 splined, 5 from neighbours'
+    >>> bool(np.nanmax(np.linalg.norm(filled.positions - take.positions, axis=2)) < 0.5)
+    True
     """
-    filler = GapFiller(take, short_s=short_s, long_s=long_s)
-    positions = filler.fill(take.positions)
-    return take.changed(filler.note, positions=positions)
+    return run(take, GapFiller(short_s=short_s, long_s=long_s))

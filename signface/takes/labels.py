@@ -2,7 +2,8 @@
 
 - `clean_labels`: what a reader does: which points have a name, and unique names for them.
 - `stripped`: a label without its subject's prefix.
-- `match_labels`, `find_labels`, `rename_to`: the markers of a layout found in a take.
+- `match_labels`, `rename_to`: the markers of a layout found in a take.
+- `Renaming`: the same as a stage, for any recording.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from collections.abc import Sequence
 
 from signface.errors import SignfaceError
 from signface.takes.recording import Recording
+from signface.takes.stages import Block, Stage, View, run
 from signface.takes.take import Take
 
 #: Names that tracking software gives to points nobody has labelled: `*12`, `U_3`, `Unlabeled 7`, or nothing at all.
@@ -79,24 +81,24 @@ def match_labels(take_labels: Sequence[str], labels: Sequence[str]) -> dict[str,
         `{wanted: name in the take}`, in the order of `labels`.
     """
     exact = set(take_labels)
-    found = {label: label for label in labels if label in exact}
+    matches = {label: label for label in labels if label in exact}
     by_subject: dict[str, dict[str, str]] = {}
-    for own in take_labels:
-        by_subject.setdefault(own.rpartition(":")[0], {})[stripped(own)] = own
-    wanted = set(labels) - set(found)
+    for name in take_labels:
+        by_subject.setdefault(name.rpartition(":")[0], {})[stripped(name)] = name
+    wanted = set(labels) - set(matches)
     by_subject = dict(sorted(by_subject.items(), key=lambda entry: -len(wanted & set(entry[1]))))  # stable: file order
-    used = set(found.values())
+    used = set(matches.values())
     for key in (stripped, _folded):
-        for own_names in by_subject.values():
+        for names in by_subject.values():
             keyed: dict[str, str] = {}
-            for own in own_names.values():
-                keyed.setdefault(key(own), own)
+            for name in names.values():
+                keyed.setdefault(key(name), name)
             for label in labels:
-                own = keyed.get(key(label), "")
-                if label not in found and own and own not in used:
-                    found[label] = own
-                    used.add(own)
-    return {label: found[label] for label in labels if label in found}
+                name = keyed.get(key(label), "")
+                if label not in matches and name and name not in used:
+                    matches[label] = name
+                    used.add(name)
+    return {label: matches[label] for label in labels if label in matches}
 
 
 def close_names(missing: Sequence[str], spare: Sequence[str], most: int = 5) -> list[str]:
@@ -137,31 +139,55 @@ def rename_to(take: Take, labels: Sequence[str]) -> Take:
     >>> rename_to(take, layout.labels).labels == take.labels
     True
     """
-    found, note = find_labels(take, labels)
-    return take.changed(note, positions=take.select(list(found.values())), labels=tuple(found))
+    return run(take, Renaming(labels))
 
 
-def find_labels(take: Recording, labels: Sequence[str]) -> tuple[dict[str, str], str]:
-    """For each of `labels` that a recording has, its own name for it, and a note for the history; see `rename_to`."""
-    labels = list(labels)
-    found = match_labels(take.labels, labels)
-    missing = [label for label in labels if label not in found]
-    spare = [label for label in take.labels if label not in set(found.values())]
+class Renaming(Stage):
+    """The markers of a layout, under its names and in its order; see `rename_to`."""
+
+    def __init__(self, labels: Sequence[str]) -> None:
+        self._labels = list(labels)
+
+    def learn(self, view: View) -> None:
+        """Which markers of the recording are meant."""
+        matches, self._note = _find_labels(view.recording, self._labels)
+        self._names = tuple(matches)
+        self._columns = [view.recording.labels.index(name) for name in matches.values()]
+
+    def labels_of(self, labels: tuple[str, ...]) -> tuple[str, ...]:
+        """Those of the layout's labels that the recording has."""
+        return self._names
+
+    def apply(self, block: Block) -> Block:
+        """The block with these markers only."""
+        return block.changed(block.positions[:, self._columns])
+
+    @property
+    def note(self) -> str:
+        """Which markers were found, under other names, or not."""
+        return self._note
+
+
+def _find_labels(take: Recording, labels: list[str]) -> tuple[dict[str, str], str]:
+    """For each of `labels` that a recording has, its name there, and a note for the history; raises as `rename_to`."""
+    matches = match_labels(take.labels, labels)
+    missing = [label for label in labels if label not in matches]
+    spare = [label for label in take.labels if label not in set(matches.values())]
     enough = min(SMALLEST_MATCH * len(labels), KNOWN_MARKERS * len(take.labels))
-    if len(found) < max(min(3, len(labels)), enough):
+    if len(matches) < max(min(3, len(labels)), enough):
         names = ", ".join(spare[:5]) + (" ..." if len(spare) > 5 else "")
         raise SignfaceError(
-            f"only {len(found)} of the layout's {len(labels)} markers are in the take: "
+            f"only {len(matches)} of the layout's {len(labels)} markers are in the take: "
             f"no {', '.join(close_names(missing, spare))}; the take also has {names or 'nothing else'}",
             file=take.name,
             hint="choose the layout of this marker set or rename the markers",
         )
-    notes = [f"rename_to {len(found)} of {len(labels)} markers"]
-    renamed = [f"{own} is {label}" for label, own in found.items() if own != label and stripped(own) != label]
+    notes = [f"rename_to {len(matches)} of {len(labels)} markers"]
+    renamed = [f"{name} is {label}" for label, name in matches.items() if name != label and stripped(name) != label]
     if renamed:
         notes.append(f"renamed: {', '.join(renamed[:5])}{' ...' * (len(renamed) > 5)}")
     if missing:
         notes.append(f"missing: {', '.join(close_names(missing, spare))}")
     if spare:
         notes.append(f"not in the layout: {', '.join(spare[:5])}{' ...' * (len(spare) > 5)}")
-    return found, "; ".join(notes)
+    return matches, "; ".join(notes)

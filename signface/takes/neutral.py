@@ -179,5 +179,5 @@ def _most_typical(rest: np.ndarray) -> int:
     """Index of the frame of a stretch that is nearest to the stretch's own median pose."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
-        own = np.sqrt(np.nanmean(np.sum((rest - np.nanmedian(rest, axis=0)) ** 2, axis=2), axis=1))
-    return int(np.nanargmin(own))
+        distances = np.sqrt(np.nanmean(np.sum((rest - np.nanmedian(rest, axis=0)) ** 2, axis=2), axis=1))
+    return int(np.nanargmin(distances))

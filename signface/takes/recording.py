@@ -41,6 +41,10 @@ class Recording(Protocol):
     @property
     def history(self) -> tuple[str, ...]: ...
 
+    def frame_at(self, seconds: float) -> int:
+        """Index of the frame nearest to a time in seconds; see `signface.frames.Timed`."""
+        ...
+
     def frames(self, begin: int, end: int, step: int = 1) -> np.ndarray:
         """(K, M, 3) positions of every `step`-th frame from `begin` to before `end`, millimetres, NaN where missing."""
         ...

@@ -1,20 +1,22 @@
 """Taking head motion away: rigid alignment in two steps (thesis, 5.2.1).
 
 - `rigid_transform`: the best rigid motion between two point sets.
-- `align_neutral`: the neutral frame's face markers onto the avatar's points.
-- `stabilise`: every frame onto the neutral frame by the head markers; `HeadMotion`: the same in pieces.
+- `align_neutral`: the neutral frame's face markers onto the avatar's points; `NeutralAlignment`: the same as a stage.
+- `stabilise`: every frame onto the neutral frame by the head markers; `HeadMotion`: the same as a stage.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from signface.errors import SignfaceError
 from signface.frames import runs
 from signface.takes.rigid import apply, flatness, inverse, rigid_transforms
-from signface.takes.take import Take
+from signface.takes.stages import Block, Stage, View, block_of, run
+from signface.takes.take import Take, columns_of
 
 #: Markers nearer than this to one line (root mean square, mm) do not fix a rotation about it.
 FLATTEST = 1.0
@@ -57,15 +59,15 @@ def rigid_transform(source: np.ndarray, target: np.ndarray, weights: np.ndarray 
     [1.0, 2.0, 3.0]
     """
     source, target = np.asarray(source, dtype=np.float64), np.asarray(target, dtype=np.float64)
-    own = np.ones(len(source)) if weights is None else np.asarray(weights, dtype=np.float64)
-    seen = np.isfinite(source).all(axis=1) & np.isfinite(target).all(axis=1) & (own > 0)
-    own = np.where(seen, own, 0.0)[None]
+    shares = np.ones(len(source)) if weights is None else np.asarray(weights, dtype=np.float64)
+    seen = np.isfinite(source).all(axis=1) & np.isfinite(target).all(axis=1) & (shares > 0)
+    shares = np.where(seen, shares, 0.0)[None]
     if seen.sum() < 3:
         raise SignfaceError(f"a rigid motion needs 3 common points, and there are {int(seen.sum())}")
     spread = np.ptp(source[seen], axis=0).max()
-    if min(flatness(source, own)[0], flatness(target, own)[0]) <= 1e-6 * max(spread, 1e-300):
+    if min(flatness(source, shares)[0], flatness(target, shares)[0]) <= 1e-6 * max(spread, 1e-300):
         raise SignfaceError("the points lie on one line and do not fix a rotation")
-    return rigid_transforms(source, target[None], own)[0]
+    return rigid_transforms(source, target[None], shares)[0]
 
 
 def align_neutral(take: Take, labels: Sequence[str], points: np.ndarray, neutral_s: float) -> Take:
@@ -88,62 +90,93 @@ def align_neutral(take: Take, labels: Sequence[str], points: np.ndarray, neutral
     ------
     SignfaceError
         The time is outside the take, or the neutral frame shows fewer than three of the markers.
+
+    See Also
+    --------
+    stabilise : the second step.
+    rigid_transform : the motion that is found.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> face = sf.read_face("default")
+    >>> take = sf.datasets.mini_take()
+    >>> layout = sf.choose_layout(take.labels, face)
+    >>> points = layout.points(face)
+    >>> aligned = align_neutral(take, layout.face_labels, points, neutral_s=0.1)
+    >>> away = aligned.select(layout.face_labels)[aligned.frame_at(0.1)] - points
+    >>> bool(np.linalg.norm(np.nanmean(away, axis=0)) < 1e-6)
+    True
     """
-    frame = take.frame_at(neutral_s)
-    pose = neutral_alignment(take.select(labels)[frame], points, take.name, neutral_s)
-    return take.changed(
-        f"align_neutral {len(labels)} markers at {neutral_s:.3f} s", positions=apply(pose, take.positions)
-    )
+    return run(take, NeutralAlignment(labels, points, neutral_s))
 
 
-def neutral_alignment(markers: np.ndarray, points: np.ndarray, name: str, neutral_s: float) -> np.ndarray:
-    """(4, 4) pose that brings the neutral frame's (P, 3) face markers onto the avatar's; see `align_neutral`."""
-    try:
-        return rigid_transform(markers, points)
-    except SignfaceError as error:
-        raise SignfaceError(
-            f"the neutral frame at {neutral_s:.3f} s cannot be aligned: {error.problem}",
-            file=name,
-            hint="choose a neutral frame that shows the face markers",
-        ) from error
+class NeutralAlignment(Stage):
+    """The recording moved rigidly as a whole onto the avatar; see `align_neutral`, whose parameters it has."""
+
+    def __init__(self, labels: Sequence[str], points: np.ndarray, neutral_s: float) -> None:
+        self._labels, self._points, self._neutral_s = list(labels), points, neutral_s
+
+    def learn(self, view: View) -> None:
+        """The rigid motion, from the neutral frame."""
+        recording = view.recording
+        frame = recording.frame_at(self._neutral_s)
+        neutral = recording.frames(frame, frame + 1)[0, columns_of(recording, self._labels)]
+        try:
+            self._pose = rigid_transform(neutral, self._points)
+        except SignfaceError as error:
+            raise SignfaceError(
+                f"the neutral frame at {self._neutral_s:.3f} s cannot be aligned: {error.problem}",
+                file=recording.name,
+                hint="choose a neutral frame that shows the face markers",
+            ) from error
+
+    def apply(self, block: Block) -> Block:
+        """The block in the avatar's place."""
+        return block.changed(apply(self._pose, block.positions))
+
+    @property
+    def note(self) -> str:
+        """By how many markers, and when."""
+        return f"align_neutral {len(self._labels)} markers at {self._neutral_s:.3f} s"
 
 
-def _unweighted(head: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _unweighted(head: np.ndarray, neutral: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Weights (0 or 1), poses and the distances that remain, before any marker is found to have slipped."""
     seen = np.isfinite(head[..., 0])
-    enough = flatness(places, seen.astype(float)) >= FLATTEST
+    enough = flatness(neutral, seen.astype(float)) >= FLATTEST
     weights = (seen & enough[:, None]).astype(float)
-    poses = rigid_transforms(places, head, weights)
-    return weights, poses, np.linalg.norm(apply(poses, places) - head, axis=2)
+    poses = rigid_transforms(neutral, head, weights)
+    return weights, poses, np.linalg.norm(apply(poses, neutral) - head, axis=2)
 
 
-def _slip(head: np.ndarray, places: np.ndarray) -> float:
+def _slip(head: np.ndarray, neutral: np.ndarray) -> float:
     """The distance (mm) at which a head marker counts half, from (F, Q, 3) frames of them."""
-    distances = _unweighted(head, places)[2]
+    distances = _unweighted(head, neutral)[2]
     known = np.isfinite(distances)
     return max(SLIP_MM, 2 * float(np.median(distances[known]))) if known.any() else SLIP_MM
 
 
-def _head_poses(head: np.ndarray, places: np.ndarray, slip: float) -> tuple[np.ndarray, np.ndarray]:
+def _head_poses(head: np.ndarray, neutral: np.ndarray, slip: float) -> tuple[np.ndarray, np.ndarray]:
     """(F, 4, 4) poses by iteratively reweighted least squares and the (F, Q) distances that remain, mm.
 
     Parameters
     ----------
     head : (F, Q, 3) array
-    places : (Q, 3) array
+    neutral : (Q, 3) array
         In the neutral frame; without NaN.
     slip : float
         See `_slip`.
     """
-    weights, poses, distances = _unweighted(head, places)
+    weights, poses, distances = _unweighted(head, neutral)
     busy = np.flatnonzero((np.nan_to_num(distances) > 0.25 * slip).any(axis=1) & ((weights > 0).sum(axis=1) > 3))
     for _ in range(10):
         if len(busy) == 0:
             break
-        own = weights[busy] / (1 + (np.nan_to_num(distances[busy]) / slip) ** 2)
-        poses[busy] = rigid_transforms(places, head[busy], own)
+        trust = weights[busy] / (1 + (np.nan_to_num(distances[busy]) / slip) ** 2)
+        poses[busy] = rigid_transforms(neutral, head[busy], trust)
         before = distances[busy]
-        distances[busy] = np.linalg.norm(apply(poses[busy], places) - head[busy], axis=2)
+        distances[busy] = np.linalg.norm(apply(poses[busy], neutral) - head[busy], axis=2)
         busy = busy[(np.abs(np.nan_to_num(distances[busy] - before)) > 0.02 * slip).any(axis=1)]
     return poses, distances
 
@@ -185,9 +218,9 @@ def least_moving(labels: Sequence[str], neutral: np.ndarray, sample: np.ndarray,
     SignfaceError
         The neutral frame shows fewer than three markers.
     """
-    shown = np.isfinite(neutral[:, 0])
-    names = [label for label, own in zip(labels, shown) if own]
-    neutral, sample = neutral[shown], sample[:, shown]
+    known = np.isfinite(neutral[:, 0])
+    names = [label for label, here in zip(labels, known) if here]
+    neutral, sample = neutral[known], sample[:, known]
     if len(names) < 3:
         raise SignfaceError(f"the neutral frame shows {len(names)} markers, and 3 are needed", file=name)
     chosen = np.arange(len(names))
@@ -205,103 +238,84 @@ def least_moving(labels: Sequence[str], neutral: np.ndarray, sample: np.ndarray,
     return [names[index] for index in chosen]
 
 
-class HeadMotion:
-    """The motion of the head in a recording, found once and taken away from any of its frames; see `stabilise`.
+class HeadMotion(Stage):
+    """The motion of the head taken away; see `stabilise`, whose parameters and errors it has.
 
-    Parameters
-    ----------
-    labels : (M,) sequence of str
-        Of all markers.
-    neutral : (M, 3) array
-        Where they are in the neutral frame.
-    sample : (S, M, 3) array
-        Frames of the recording, evenly taken.
-    rate : float
-    head : sequence of str
-        Labels of the head markers; those that are not among the markers are passed over.
-    fallback : str, optional
-        `least-moving`: where the head markers do not suffice, use the markers that move least.
-    name : str
-    neutral_s : float
-        The take's, and the time of its neutral frame, for errors.
+    Blocks get the head's poses. Frames that stand alone get none from their neighbours.
 
     Attributes
     ----------
-    reach : int
-        So many frames beside a piece decide its poses.
-
-    Raises
-    ------
-    SignfaceError
-        Fewer than three head markers that are not on one line (and no fallback).
+    labels : list of str
+        The markers that carry the head, once it has learnt.
     """
 
-    def __init__(
-        self,
-        labels: Sequence[str],
-        neutral: np.ndarray,
-        sample: np.ndarray,
-        rate: float,
-        *,
-        head: Sequence[str],
-        fallback: str | None = None,
-        name: str = "take",
-        neutral_s: float = 0.0,
-    ) -> None:
+    def __init__(self, head: Sequence[str], *, neutral_s: float, fallback: str | None = None) -> None:
         if fallback not in (None, "least-moving"):
             raise SignfaceError(f"no fallback named {fallback}", hint="the fallback is least-moving")
-        place = {label: index for index, label in enumerate(labels)}
-        shown = [label for label in head if label in place and np.isfinite(neutral[place[label], 0])]
-        said = f"by {len(shown)} head markers"
-        if len(shown) < 3 or self._flat(neutral[[place[label] for label in shown]]):
-            if fallback is None:
-                why = "and 3 are needed" if len(shown) < 3 else "but they lie on one line"
+        self._head, self._neutral_s, self._fallback = list(head), neutral_s, fallback
+
+    def learn(self, view: View) -> None:
+        """Which markers carry the head, where they are in the neutral frame, and how well they keep their places."""
+        recording = view.recording
+        frame = recording.frame_at(self._neutral_s)
+        neutral = recording.frames(frame, frame + 1)[0]
+        sample = view.spread(SAMPLE_FRAMES).positions
+        column = {label: index for index, label in enumerate(recording.labels)}
+        carriers = [label for label in self._head if label in column and np.isfinite(neutral[column[label], 0])]
+        self._note = f"by {len(carriers)} head markers"
+        if len(carriers) < 3 or _flat(neutral[[column[label] for label in carriers]]):
+            if self._fallback is None:
+                why = "and 3 are needed" if len(carriers) < 3 else "but they lie on one line"
                 raise SignfaceError(
-                    f"the neutral frame at {neutral_s:.3f} s shows {len(shown)} of {len(head)} head markers, {why}",
-                    file=name,
+                    f"the neutral frame at {self._neutral_s:.3f} s shows {len(carriers)} of {len(self._head)}"
+                    f" head markers, {why}",
+                    file=recording.name,
                     hint="choose another neutral frame, or the fallback least-moving",
                 )
-            shown = least_moving(labels, neutral, sample[:: max(1, len(sample) // 600)], name)
-            said = f"by the {len(shown)} least-moving markers ({', '.join(shown[:6])}{' ...' * (len(shown) > 6)})"
-            if self._flat(neutral[[place[label] for label in shown]]):
-                raise SignfaceError("the markers lie on one line and do not fix a rotation", file=name)
-        self.labels = shown
-        self._columns = [place[label] for label in shown]
-        self._places = neutral[self._columns]
-        self._slip = _slip(sample[:, self._columns], self._places)
-        self._longest = int(LONGEST_BLIND_S * rate)
+            few = sample[:: max(1, len(sample) // 600)]
+            carriers = least_moving(recording.labels, neutral, few, recording.name)
+            names = ", ".join(carriers[:6]) + " ..." * (len(carriers) > 6)
+            self._note = f"by the {len(carriers)} least-moving markers ({names})"
+            if _flat(neutral[[column[label] for label in carriers]]):
+                raise SignfaceError("the markers lie on one line and do not fix a rotation", file=recording.name)
+        self.labels = carriers
+        self._columns = [column[label] for label in carriers]
+        self._neutral = neutral[self._columns]
+        self._slip = _slip(sample[:, self._columns], self._neutral)
+        self._longest = int(LONGEST_BLIND_S * recording.rate)
         self.reach = self._longest + 1
-        self._said = said
-        self._distances: list[np.ndarray] = []
-        self._bridged = self._blind = 0
+        self._distances = np.full((recording.n_frames, len(carriers)), np.nan)
+        self._bridged, self._blind = np.zeros((2, recording.n_frames), dtype=bool)
 
-    @staticmethod
-    def _flat(places: np.ndarray) -> bool:
-        return bool(flatness(places, np.ones((1, len(places))))[0] < FLATTEST)
-
-    def poses(self, positions: np.ndarray, piece: slice = slice(None)) -> np.ndarray:
-        """(F, 4, 4) poses of (F, M, 3) positions, and what happened in the frames of `piece` noted."""
-        poses, distances = _head_poses(positions[:, self._columns], self._places, self._slip)
-        unseen = np.isnan(poses[piece, 0, 0])
-        _bridge(poses, self._longest)
-        blind = int(np.isnan(poses[piece, 0, 0]).sum())
-        self._bridged += int(unseen.sum()) - blind
-        self._blind += blind
-        self._distances.append(distances[piece])
-        return poses
+    def apply(self, block: Block) -> Block:
+        """The block in the neutral frame's place, with the head's poses."""
+        poses, distances = _head_poses(block.positions[:, self._columns], self._neutral, self._slip)
+        if block.frames.step == 1:
+            unseen = np.isnan(poses[:, 0, 0])
+            _bridge(poses, self._longest)
+            wanted, blind = block.frames[block.inner], np.isnan(poses[:, 0, 0])
+            frames = slice(wanted.start, wanted.stop)
+            self._distances[frames] = distances[block.inner]
+            self._blind[frames], self._bridged[frames] = blind[block.inner], (unseen & ~blind)[block.inner]
+        return block.changed(apply(inverse(poses), block.positions), head=poses)
 
     @property
     def note(self) -> str:
-        """What was found until now, for the history."""
-        columns = np.concatenate(self._distances).T
-        typical = [float(np.nanmedian(own)) if np.isfinite(own).any() else 0.0 for own in columns]
-        farthest = [float(np.nanquantile(own, 0.9)) if np.isfinite(own).any() else 0.0 for own in columns]
+        """Which markers carry the head, which of them slipped, and where there was no pose, until now."""
+        columns = self._distances.T
+        typical = [float(np.nanmedian(column)) if np.isfinite(column).any() else 0.0 for column in columns]
+        farthest = [float(np.nanquantile(column, 0.9)) if np.isfinite(column).any() else 0.0 for column in columns]
         limit = 4 * max(SLIP_MM, float(np.median(typical)))
         slipped = [f"{label} ({far:.1f} mm)" for label, far in zip(self.labels, farthest) if far > limit]
-        note = f"stabilise {self._said}"
+        bridged, blind = int(self._bridged.sum()), int(self._blind.sum())
+        note = f"stabilise {self._note}"
         note += f"; slipped: {', '.join(slipped)}" if slipped else ""
-        note += f"; {self._bridged} frames interpolated" if self._bridged else ""
-        return note + (f"; {self._blind} frames without a pose" if self._blind else "")
+        note += f"; {bridged} frames interpolated" if bridged else ""
+        return note + (f"; {blind} frames without a pose" if blind else "")
+
+
+def _flat(neutral: np.ndarray) -> bool:
+    return bool(flatness(neutral, np.ones((1, len(neutral))))[0] < FLATTEST)
 
 
 def stabilise(
@@ -334,18 +348,22 @@ def stabilise(
     ------
     SignfaceError
         Fewer than three head markers that are not on one line (and no fallback), or the time is outside the take.
+
+    See Also
+    --------
+    align_neutral : the first step.
+    signface.takes.neutral.find_neutral : a neutral time.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> take = sf.datasets.mini_take()
+    >>> layout = sf.choose_layout(take.labels, sf.read_face("default"))
+    >>> still, poses = stabilise(take, head=layout.head_labels, neutral_s=0.1)
+    >>> poses.shape, still.history[-1]
+    ((1184, 4, 4), 'stabilise by 6 head markers')
     """
-    neutral = take.positions[take.frame_at(neutral_s)]
-    sample = take.positions[:: max(1, take.n_frames // SAMPLE_FRAMES)]
-    motion = HeadMotion(
-        take.labels,
-        neutral,
-        sample,
-        take.rate,
-        head=head,
-        fallback=fallback,
-        name=take.name,
-        neutral_s=neutral_s,
-    )
-    poses = motion.poses(take.positions)
-    return take.changed(motion.note, positions=apply(inverse(poses), take.positions)), poses
+    view = View(take).through(HeadMotion(head, neutral_s=neutral_s, fallback=fallback))
+    block = block_of(view.recording, 0, take.n_frames)
+    assert block.head is not None
+    return replace(take, positions=block.positions, history=view.recording.history), block.head

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -102,11 +102,7 @@ class Take(TimedArrays, Content):
         SignfaceError
             A marker is not in the take.
         """
-        index = {label: i for i, label in enumerate(self.labels)}
-        missing = [label for label in labels if label not in index]
-        if missing:
-            raise SignfaceError(f"{self.name}: no marker named {', '.join(missing[:5])}")
-        return self.positions[:, [index[label] for label in labels]]
+        return self.positions[:, columns_of(self, labels)]
 
     def to_frame(self) -> pd.DataFrame:
         """A table with a row for each frame, `time_s` its index, and `LABEL_x, LABEL_y, LABEL_z` of each marker (mm).
@@ -152,3 +148,22 @@ class Take(TimedArrays, Content):
     def changed(self, operation: str, **fields: object) -> Take:
         """A copy with some fields replaced and `operation` appended to its history."""
         return replace(self, history=(*self.history, operation), **fields)  # type: ignore[arg-type]
+
+
+class Labelled(Protocol):
+    """What has named markers."""
+
+    @property
+    def labels(self) -> tuple[str, ...]: ...
+
+    @property
+    def name(self) -> str: ...
+
+
+def columns_of(recording: Labelled, labels: Sequence[str]) -> list[int]:
+    """Where the named markers are among those of a recording; see `Take.select`."""
+    column = {label: number for number, label in enumerate(recording.labels)}
+    missing = [label for label in labels if label not in column]
+    if missing:
+        raise SignfaceError(f"{recording.name}: no marker named {', '.join(missing[:5])}")
+    return [column[label] for label in labels]

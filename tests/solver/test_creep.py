@@ -34,7 +34,7 @@ def test_most_of_the_creep_is_found_and_no_expression_is_taken_for_it(face, layo
     slow = np.sin(np.linspace(0.0, 3.0, len(moved)))[:, None, None]
     crept = slow * rng.normal(0.0, 0.3, (1, 40, 3))
     given = moved + crept + rng.normal(0.0, 0.05, moved.shape)
-    creep = Creep(given, RATE_HZ, face, layout)
+    creep = Creep(face, layout).fit(given, RATE_HZ)
     found = creep.at(np.arange(len(given)))
     assert np.sqrt(((found - crept) ** 2).mean()) < 0.5 * np.sqrt((crept**2).mean())
     solver = ThinShellSolver(face, layout)
@@ -45,14 +45,16 @@ def test_most_of_the_creep_is_found_and_no_expression_is_taken_for_it(face, layo
 
 def test_where_nothing_creeps_nothing_is_taken_away(face, layout, shown):
     _, moved = shown
-    assert Creep(moved, RATE_HZ, face, layout).size_mm < 0.05
+    assert Creep(face, layout).fit(moved, RATE_HZ).size_mm < 0.05
 
 
 def test_an_expression_held_for_long_is_kept(face, layout):
     weights = np.zeros((150, face.n_bases))
     weights[25:125, [face.names.index(name) for name in ("mouthSmileLeft", "mouthSmileRight")]] = 0.8
     moved = np.tensordot(weights, layout.bases(face), axes=1)
-    solved = ThinShellSolver(face, layout).solve(moved - Creep(moved, RATE_HZ, face, layout).at(np.arange(150))).weights
+    solved = (
+        ThinShellSolver(face, layout).solve(moved - Creep(face, layout).fit(moved, RATE_HZ).at(np.arange(150))).weights
+    )
     assert solved[75, face.names.index("mouthSmileLeft")] > 0.7
 
 
@@ -61,7 +63,7 @@ def test_creep_between_two_frames_lies_between_and_gaps_do_no_harm(face, layout,
     gone = moved.copy()
     gone[20:40, 3] = np.nan
     gone[200] = np.nan
-    creep = Creep(gone + 0.2, RATE_HZ, face, layout)
+    creep = Creep(face, layout).fit(gone + 0.2, RATE_HZ)
     steps = creep.at(np.array([10.0, 10.25, 11.0, 1e6]))
     assert np.isfinite(creep.at(np.arange(len(gone)))).all()
     np.testing.assert_allclose(steps[1], 0.75 * steps[0] + 0.25 * steps[2])

@@ -14,13 +14,14 @@ from signface.settings.solve import SolveSettings
 from signface.solver import preparation
 from signface.solver.solving import solve, solve_pieces
 from signface.takes import gaps
-from signface.takes.cleaning import CleanRecording
+from signface.takes.cleaning import Kept, cleaning_stages
 from signface.takes.filtering import lowpass
 from signface.takes.formats.c3d import open_c3d, write_c3d
 from signface.takes.formats.table import open_table, write_table
 from signface.takes.gaps import fill_gaps
 from signface.takes.labels import rename_to
 from signface.takes.reading import read_take
+from signface.takes.stages import View
 from signface.takes.take import Take
 
 
@@ -48,6 +49,10 @@ def gappy(mini):
     return take.changed("gaps cut", positions=positions)
 
 
+def cleaned(recording, layout):
+    return Kept(View(recording).through(*cleaning_stages(layout.labels)).recording)
+
+
 def joined(parts, field):
     return np.concatenate([getattr(part, field) for part in parts])
 
@@ -66,7 +71,7 @@ def test_pieces_give_the_weights_of_the_whole(piece, gappy, face, layout):
 
 def test_cleaning_in_pieces_is_cleaning_the_take(gappy, layout):
     whole = lowpass(fill_gaps(rename_to(gappy, layout.labels)))
-    clean = CleanRecording(gappy, layout.labels)
+    clean = cleaned(gappy, layout)
     parts = [clean.frames(begin, min(begin + 170, gappy.n_frames)) for begin in range(0, gappy.n_frames, 170)]
     np.testing.assert_allclose(np.concatenate(parts), whole.positions, rtol=0, atol=1e-9)
     assert clean.history == whole.history
@@ -101,7 +106,7 @@ def test_memory_does_not_grow_with_the_recording(gappy, face, layout, tmp_path, 
     del positions
     tracemalloc.start()
     recording, size = recordings[12]
-    CleanRecording(recording, layout.labels).view(500, piece=600)
+    cleaned(recording, layout).glance(500, piece=600)
     assert tracemalloc.get_traced_memory()[1] < 0.7 * size
     recording, size = recordings[4]
     solved = solve_pieces(recording, face, layout, settings=SolveSettings(neutral=0.33), piece=300)

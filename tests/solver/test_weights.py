@@ -54,7 +54,7 @@ def test_rest_is_no_weight_at_all(solver, face, layout):
     for method in EXACT:
         solution = make_solver(method, face, layout).solve(np.zeros((3, 40, 3)))
         assert np.abs(solution.weights).max() < 1e-9, method
-    assert np.abs(solver.push(np.zeros((40, 3))).weights).max() < 1e-9
+    assert np.abs(solver.stream().push(np.zeros((40, 3))).weights).max() < 1e-9
 
 
 def test_weights_do_not_depend_on_the_unit_of_length(face, layout, solver, displacements):
@@ -283,11 +283,29 @@ def test_a_stream_gives_the_weights_of_the_batch(face, layout, displacements):
     holes[20:30, 7] = np.nan
     holes[40] = np.nan
     batch = solver.solve(holes)
-    stream = [solver.push(frame) for frame in holes]
+    live = solver.stream()
+    stream = [live.push(frame) for frame in holes]
     weights = np.concatenate([solution.weights for solution in stream])
     residual = np.concatenate([solution.residual for solution in stream])
     np.testing.assert_allclose(weights, batch.weights, atol=1e-6)
     np.testing.assert_allclose(residual, batch.residual, atol=1e-6)
+
+
+def test_two_streams_of_one_solver_do_not_know_of_one_another(solver, displacements):
+    one, other = displacements.copy(), displacements[::-1].copy()
+    one[20:30, 7] = np.nan
+    other[10:15, 3] = np.nan
+    alone = []
+    for frames in (one, other):
+        stream = solver.stream()
+        alone.append([stream.push(frame) for frame in frames])
+    first, second = solver.stream(), solver.stream()
+    together = [(first.push(a), second.push(b)) for a, b in zip(one, other, strict=True)]
+    solver.solve(one)  # nor does a batch
+    for apart, beside in zip(alone, zip(*together, strict=True), strict=True):
+        for a, b in zip(apart, beside, strict=True):
+            np.testing.assert_array_equal(a.weights, b.weights)
+            np.testing.assert_array_equal(a.residual, b.residual)
 
 
 def test_the_residual_is_the_distance_to_the_solved_markers(face, layout, solver, displacements):

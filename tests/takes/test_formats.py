@@ -140,7 +140,7 @@ def test_a_format_that_holds_weights_is_not_solved_in_a_corpus(tmp_path):
         return Descriptors(np.zeros((2, 1)), ("jawOpen",), 25.0)
 
     (tmp_path / "laugh.txt").write_text("WEIGHTS 0 0\n")
-    origin = find_origin(TakeEntry(tmp_path / "laugh.txt", "S1", "EU"), tmp_path, make_recipe("default", "default-40"))
+    origin = find_origin(TakeEntry(tmp_path / "laugh.txt", "S1", "EU"), tmp_path, make_recipe())
     assert origin.recipe == weights_recipe()
 
 

@@ -87,7 +87,7 @@ def _damaged(file: Path, what: str) -> SignfaceError:
 def _parameters(section: bytes, order: str, file: Path) -> dict[str, dict[str, _Parameter]]:
     """Groups of parameters by name; every record lies inside the section, or SignfaceError."""
     names: dict[int, str] = {}
-    found: list[tuple[int, str, _Parameter]] = []
+    parameters: list[tuple[int, str, _Parameter]] = []
     at = 4
     while True:
         if at + 2 > len(section):
@@ -108,7 +108,7 @@ def _parameters(section: bytes, order: str, file: Path) -> dict[str, dict[str, _
                 raise _damaged(file, "two groups have one number")
         else:
             parameter, end = _parameter(section, name_end + 2, name, file)
-            found.append((group, name, parameter))
+            parameters.append((group, name, parameter))
         if end >= len(section) or end + 1 + section[end] > len(section) or section[end] > LONGEST_DESCRIPTION:
             raise _damaged(file, f"the description of {name} lies outside it")
         if offset == 0:
@@ -117,7 +117,7 @@ def _parameters(section: bytes, order: str, file: Path) -> dict[str, dict[str, _
         if at != end + 1 + section[end]:
             raise _damaged(file, f"{name} is longer or shorter than it declares")
     groups: dict[str, dict[str, _Parameter]] = {name: {} for name in names.values()}
-    for group, name, parameter in found:
+    for group, name, parameter in parameters:
         if group not in names:
             raise _damaged(file, f"the parameter {name} belongs to no group")
         groups[names[group]][name] = parameter

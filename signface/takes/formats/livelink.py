@@ -130,8 +130,8 @@ def read_livelink(path: str | PathLike[str], *, unit: str | None = None) -> Desc
         raise SignfaceError("a row has a timecode and nothing else", file=file, hint="the file may be cut short")
     kept = np.flatnonzero(np.diff(frame, prepend=-1) > 0)
     even = np.arange(frame[-1] + 1)
-    wanted = [columns.index(column) - 1 for column in (*bases, *(own for own in ROTATIONS if own in columns))]
-    filled = np.column_stack([np.interp(even, frame[kept], values[kept, place]) for place in wanted])
+    wanted = [columns.index(column) - 1 for column in (*bases, *(angle for angle in ROTATIONS if angle in columns))]
+    filled = np.column_stack([np.interp(even, frame[kept], values[kept, column]) for column in wanted])
     notes = [f"read {file.name} (Live Link Face, {rate:g} Hz)"]
     if len(even) > len(kept):
         notes.append(f"filled {len(even) - len(kept)} dropped frames")

@@ -190,7 +190,7 @@ def supported_formats() -> tuple[Format, ...]:
     ['c3d', 'trc', 'qtm', 'table']
     """
     _import_shipped()
-    shipped = {module: place for place, module in enumerate(SHIPPED)}
+    shipped = {module: number for number, module in enumerate(SHIPPED)}
     return tuple(sorted(_formats.values(), key=lambda format: shipped.get(format.open.__module__, len(shipped))))
 
 
@@ -233,7 +233,7 @@ def format_of(path: str | PathLike[str]) -> Format:
 
 
 def _surest(head: FileHead) -> Format | None:
-    certainties = [(format.certainty(head), place, format) for place, format in enumerate(supported_formats())]
+    certainties = [(format.certainty(head), number, format) for number, format in enumerate(supported_formats())]
     certainty, _, format = max(certainties, key=lambda entry: entry[:2])
     return format if certainty > 0 else None
 

@@ -23,7 +23,7 @@ AXES = ("x", "y", "z")
 
 def _markers(columns: list[str], file: Path) -> tuple[list[str], np.ndarray]:
     """Labels in order, and the (M, 3) column numbers of their coordinates."""
-    places: dict[str, list[int]] = {}
+    numbers_of: dict[str, list[int]] = {}
     order: list[tuple[str, list[int]]] = []
     for number, column in enumerate(columns[1:], start=1):
         label, _, axis = column.rpartition("_")
@@ -33,17 +33,17 @@ def _markers(columns: list[str], file: Path) -> tuple[list[str], np.ndarray]:
                 file=file,
                 hint="its columns are time_s and LABEL_x, LABEL_y, LABEL_z for each marker",
             )
-        place = AXES.index(axis.lower())
-        if label not in places or places[label][place] >= 0:
-            places[label] = [-1, -1, -1]
-            order.append((label, places[label]))
-        places[label][place] = number
-    broken = [label for label, own in order if min(own) < 0]
+        axis_number = AXES.index(axis.lower())
+        if label not in numbers_of or numbers_of[label][axis_number] >= 0:
+            numbers_of[label] = [-1, -1, -1]
+            order.append((label, numbers_of[label]))
+        numbers_of[label][axis_number] = number
+    broken = [label for label, numbers in order if min(numbers) < 0]
     if broken:
         raise SignfaceError(f"not all of x, y and z are there for {', '.join(broken[:5])}", file=file)
     if not order:
         raise SignfaceError("has no markers", file=file, hint="its columns are time_s and LABEL_x, LABEL_y, LABEL_z")
-    return [label for label, _ in order], np.array([own for _, own in order])
+    return [label for label, _ in order], np.array([numbers for _, numbers in order])
 
 
 def _certainty(head: FileHead) -> float:
@@ -75,7 +75,7 @@ def open_table(path: str | PathLike[str], *, unit: str | None = None) -> TakeFil
         raise SignfaceError("its first column is not time_s", file=file, hint="put the time in seconds there")
     while columns and not columns[-1]:
         columns.pop()
-    labels, places = _markers(columns, file)
+    labels, coordinates = _markers(columns, file)
     rows = TextRows(text, 1, len(columns), separator)
     times = rows.column(0)
     rate = even_rate(times, file)
@@ -84,7 +84,7 @@ def open_table(path: str | PathLike[str], *, unit: str | None = None) -> TakeFil
         raise SignfaceError("none of the markers has a label", file=file, hint="label the markers")
     return marker_rows(
         rows,
-        places[kept],
+        coordinates[kept],
         names,
         rate,
         units=None,

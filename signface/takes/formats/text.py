@@ -160,8 +160,8 @@ class TextFile:
             text = content.decode("utf-8")
         except UnicodeDecodeError:
             text = content.decode("latin-1")
-        found = [line.rstrip("\r") for line in text.split(self._newline.decode()) if line.strip(BLANK)]
-        return list(zip(self.line_numbers[first : wanted.stop : step].tolist(), found, strict=True))
+        filled = [line.rstrip("\r") for line in text.split(self._newline.decode()) if line.strip(BLANK)]
+        return list(zip(self.line_numbers[first : wanted.stop : step].tolist(), filled, strict=True))
 
 
 class TextRows:
@@ -311,7 +311,7 @@ def even_rate(times: np.ndarray, file: Path) -> float:
 
 def marker_rows(
     rows: TextRows,
-    places: np.ndarray,
+    columns: np.ndarray,
     labels: Sequence[str],
     rate: float,
     *,
@@ -327,12 +327,12 @@ def marker_rows(
     ----------
     rows : TextRows
         A row for each frame.
-    places : (M, 3) int array
+    columns : (M, 3) int array
         Columns of x, y and z of each marker.
     labels, rate, start, history
         As of `Take`; a note of the unit joins the history as its second entry.
     units, unit : str, optional
-        As `found` and `given` of `signface.takes.formats.units.unit_factor`.
+        As `in_file` and `given` of `signface.takes.formats.units.unit_factor`.
     zero_is_missing : bool
         Whether a marker at exactly (0, 0, 0) is a missing one.
 
@@ -345,7 +345,7 @@ def marker_rows(
 
     def raw(begin: int, end: int, step: int = 1) -> np.ndarray:
         values = rows.values(begin, end, step)
-        positions = values[:, places.ravel()].reshape(len(values), len(places), 3)
+        positions = values[:, columns.ravel()].reshape(len(values), len(columns), 3)
         if zero_is_missing:
             positions[(positions == 0).all(axis=2)] = np.nan
         return positions

@@ -79,7 +79,7 @@ def inferred_unit(positions: np.ndarray) -> str:
 
 
 def unit_factor(
-    found: str | Sequence[str] | None,
+    in_file: str | Sequence[str] | None,
     given: str | None,
     *,
     markers: int,
@@ -89,7 +89,7 @@ def unit_factor(
 
     Parameters
     ----------
-    found : str or sequence of str, optional
+    in_file : str or sequence of str, optional
         The unit that the file names: one for all, or one for each marker. Empty or None when it names none.
     given : str, optional
         The unit that the user gives; it has the last word.
@@ -110,7 +110,7 @@ def unit_factor(
     """
     if given is not None:
         return millimetres_per(given), f"unit {given} (given)"
-    units = [found] if isinstance(found, str) else list(found or ())
+    units = [in_file] if isinstance(in_file, str) else list(in_file or ())
     units = [unit.strip() for unit in units]
     named = [unit for unit in units if unit]
     if not named:

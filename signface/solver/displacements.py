@@ -1,0 +1,107 @@
+"""From markers without head motion to displacements on the avatar: what the solver is given.
+
+- `Displacements`: the stage that carries the face markers over.
+- `neutral_places`: where markers are in a neutral frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from signface.face.layout import MarkerLayout
+from signface.face.model import FaceModel
+from signface.solver.adaptation import make_adaptation
+from signface.takes.recording import Recording
+from signface.takes.stages import Block, Stage, View
+from signface.takes.take import columns_of
+
+#: The neutral place of a marker is its median within this time of the neutral frame (s): one frame's jitter would
+#: otherwise be carried into every frame of the take.
+NEUTRAL_WINDOW_S = 0.05
+
+
+class Displacements(Stage):
+    """Displacements of the face markers from their neutral places (eq. 5.21), adapted to the avatar (eq. 5.18 to 5.20).
+
+    It stands behind `signface.takes.stabilisation.HeadMotion`, and gives blocks whose positions are displacements.
+
+    Parameters
+    ----------
+    labels : sequence of str
+        Face markers of the layout that the neutral frame shows.
+    face : FaceModel
+    layout : MarkerLayout
+    kind : str
+        See `signface.solver.adaptation.make_adaptation`.
+    neutral_s : float
+        Time of the neutral frame in seconds.
+
+    Attributes
+    ----------
+    adaptation : SimilarityAdaptation or MorphologicalAdaptation
+        From the signer's face, in its neutral pose, to the avatar's; once it has learnt.
+
+    Raises
+    ------
+    SignfaceError
+        The neutral markers do not allow an adaptation, or there is none of that name; when it learns.
+    """
+
+    def __init__(
+        self, labels: Sequence[str], face: FaceModel, layout: MarkerLayout, *, kind: str, neutral_s: float
+    ) -> None:
+        self._labels, self._face, self._layout = tuple(labels), face, layout
+        self._kind, self._neutral_s = kind, neutral_s
+
+    def learn(self, view: View) -> None:
+        """The adaptation, from the neutral places of the markers."""
+        self._columns = columns_of(view.recording, self._labels)
+        _, places = neutral_places(view.recording, self._labels, self._neutral_s)
+        self.adaptation = make_adaptation(self._kind, places, self._layout.points(self._face, self._labels))
+        # Against the adapted neutral, not the avatar's: where the map passes by the markers, rest must still be rest.
+        self._rest = self.adaptation.transform(places)
+
+    def labels_of(self, labels: tuple[str, ...]) -> tuple[str, ...]:
+        """The face markers."""
+        return self._labels
+
+    def apply(self, block: Block) -> Block:
+        """The block's displacements, millimetres on the avatar."""
+        return block.changed(self.adaptation.transform(block.positions[:, self._columns]) - self._rest)
+
+    @property
+    def note(self) -> str:
+        """To which face, how, and by which markers."""
+        dropped = [label for label in self._layout.face_labels if label not in self._labels]
+        note = f"adapted to {self._face.name} ({self.adaptation.description})"
+        note += f" by {len(self._labels)} markers of {self._layout.name}"
+        return note + (f" without {', '.join(dropped[:5])}{' ...' * (len(dropped) > 5)}" if dropped else "")
+
+
+def neutral_places(recording: Recording, labels: Sequence[str], neutral_s: float) -> tuple[tuple[str, ...], np.ndarray]:
+    """The markers of `labels` that are seen around a neutral frame, and their median places there.
+
+    Returns
+    -------
+    (tuple of str, (K, 3) array)
+        Labels in the order given, and places in millimetres.
+
+    Raises
+    ------
+    SignfaceError
+        The time is outside the recording.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> seen, places = neutral_places(sf.datasets.mini_take(), ["LBROI", "RBROI"], neutral_s=0.1)
+    >>> seen, places.shape
+    (('LBROI', 'RBROI'), (2, 3))
+    """
+    frame, half = recording.frame_at(neutral_s), int(NEUTRAL_WINDOW_S * recording.rate)
+    window = recording.frames(max(0, frame - half), min(recording.n_frames, frame + half + 1))
+    window = window[:, columns_of(recording, labels)]
+    seen = np.isfinite(window[..., 0]).any(axis=0)
+    return tuple(label for label, here in zip(labels, seen) if here), np.nanmedian(window[:, seen], axis=0)
