@@ -37,7 +37,18 @@ RIDGE_MM2 = 0.05
 
 
 def gap_runs(take: Take) -> dict[str, np.ndarray]:
-    """For each marker, the (R, 2) first frame and frame after the last of each of its gaps."""
+    """For each marker, the (R, 2) first frame and frame after the last of each of its gaps.
+
+    See Also
+    --------
+    fill_gaps : fill them.
+
+    Examples
+    --------
+    >>> take = Take([[[np.nan] * 3], [[0, 0, 0]], [[np.nan] * 3]], ("NOSE",), rate=50)
+    >>> gap_runs(take)["NOSE"].tolist()
+    [[0, 1], [2, 3]]
+    """
     missing = np.isnan(take.positions[..., 0])
     return {label: runs(missing[:, marker]) for marker, label in enumerate(take.labels)}
 

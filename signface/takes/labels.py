@@ -79,6 +79,15 @@ def match_labels(take_labels: Sequence[str], labels: Sequence[str]) -> dict[str,
     -------
     dict of str to str
         `{wanted: name in the take}`, in the order of `labels`.
+
+    See Also
+    --------
+    rename_to : the take with these markers under the wanted names.
+
+    Examples
+    --------
+    >>> match_labels(["Anna:LBRO", "Anna:r_brow", "Ben:LBRO"], ["LBRO", "RBROW", "CHIN"])
+    {'LBRO': 'Anna:LBRO', 'RBROW': 'Anna:r_brow'}
     """
     exact = set(take_labels)
     matches = {label: label for label in labels if label in exact}

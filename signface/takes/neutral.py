@@ -79,6 +79,19 @@ def find_neutral(take: Take, labels: Sequence[str] | None = None, *, head: Seque
     ------
     SignfaceError
         No frame shows three markers.
+
+    See Also
+    --------
+    neutral_candidates : one time for each pose in which the face rests.
+    signface.solver.resting.resting_time : the neutral time by what the avatar explains, which the pipeline uses.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> take = sf.datasets.mini_take()
+    >>> layout = sf.choose_layout(take.labels, sf.read_face("default"))
+    >>> 0 <= find_neutral(take, layout.face_labels, head=layout.head_labels) <= take.duration
+    True
     """
     return _longest_nearest(take, _motion(take, labels, head))
 
@@ -101,6 +114,17 @@ def neutral_candidates(
     """Times at which the face rests, one for each pose that it rests in, the longest rest first.
 
     Parameters are those of `find_neutral`; at most `most` times are given, and always the one of `find_neutral`.
+
+    See Also
+    --------
+    find_neutral : the best of them by length and nearness to the median pose.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> take = sf.datasets.mini_take()
+    >>> find_neutral(take) in neutral_candidates(take)
+    True
     """
     motion = _motion(take, labels, head)
     times = [_longest_nearest(take, motion)]

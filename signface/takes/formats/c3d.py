@@ -140,6 +140,17 @@ def write_c3d(take: Take, path: str | PathLike[str]) -> None:
     SignfaceError
         The ending is not .c3d, the take starts before time 0 or has more frames than the format counts (65535), or
         the file cannot be written.
+
+    See Also
+    --------
+    signface.takes.formats.table.write_table : readable by eye.
+
+    Examples
+    --------
+    >>> take = Take([[[1.0, 2, 3]], [[1, 2, np.nan]]], ("NOSE",), rate=50)
+    >>> write_c3d(take, "take.c3d")
+    >>> read_c3d("take.c3d").positions.tolist()
+    [[[1.0, 2.0, 3.0]], [[nan, nan, nan]]]
     """
     import ezc3d
 

@@ -107,6 +107,17 @@ def write_table(take: Take, path: str | PathLike[str]) -> None:
     ------
     SignfaceError
         The file cannot be written.
+
+    See Also
+    --------
+    signface.takes.formats.c3d.write_c3d : smaller, and read by every motion-capture program.
+
+    Examples
+    --------
+    >>> take = Take([[[1.0, 2, 3]], [[1, 2, np.nan]]], ("NOSE",), rate=50)
+    >>> write_table(take, "take.csv")
+    >>> Path("take.csv").read_text().splitlines()
+    ['time_s,NOSE_x,NOSE_y,NOSE_z', '0.000000,1.000000,2.000000,3.000000', '0.020000,,,']
     """
     import pandas as pd
 
