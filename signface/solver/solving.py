@@ -85,7 +85,7 @@ def solve(
     >>> from signface.files import bundled_corpus
     >>> from signface.takes.reading import read_take
     >>> solve(read_take(bundled_corpus() / "M1_IE_J.c3d")).weights.shape
-    (2146, 51)
+    (2149, 51)
     """
     pieces = solve_pieces(
         recording,
