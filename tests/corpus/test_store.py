@@ -12,6 +12,7 @@ from dataclasses import replace
 import duckdb
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from hypothesis import given, settings
@@ -80,6 +81,22 @@ def test_what_is_stored_comes_back_to_the_last_bit(
         "laugh",
         tuple(history),
     )
+
+
+def test_a_store_of_the_first_version_is_read(origin, nodding, tmp_path):
+    """Its columns stood in another order, and its metadata said nothing of settings."""
+    store = DescriptorStore(tmp_path)
+    table = {"take": "S1/laugh", "signer": "S1", "kind": "EU", "time_s": nodding.time}
+    table |= dict(zip(nodding.names, nodding.weights.T, strict=True)) | {"residual_mm": nodding.residual}
+    table |= {f"head_{n // 4}{n % 4}": nodding.head.reshape(-1, 16)[:, n] for n in range(16)}
+    about = {"format": 1, "key": origin.key, "bases": nodding.names, "rate": nodding.rate.hex()}
+    about |= {"start": nodding.start.hex(), "name": nodding.name, "history": ["made"], "versions": {}}
+    old = pa.Table.from_pandas(pd.DataFrame(table), preserve_index=False)
+    store.path(origin).parent.mkdir(parents=True)
+    pq.write_table(old.replace_schema_metadata({"signface": json.dumps(about)}), store.path(origin))
+    assert store.read(origin) == nodding
+    assert store.read(origin).history == ("made",)
+    assert read_weights(store.path(origin)) == nodding
 
 
 def test_the_same_descriptors_are_the_same_bytes(origin, laugh, tmp_path):

@@ -1,4 +1,4 @@
-"""The script of the documentation runs as it stands there."""
+"""The scripts of the documentation run as they stand there."""
 
 from __future__ import annotations
 
@@ -9,9 +9,13 @@ from signface.label.persistence import load_model
 from tests.conftest import REPOSITORY
 
 
-def test_the_script_of_the_documentation_trains_compares_and_saves(tmp_path, monkeypatch, capsys):
+def scripts():
     text = (REPOSITORY / "docs" / "scripting.md").read_text(encoding="utf-8")
-    (script,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    return re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+
+
+def test_the_script_of_the_documentation_trains_compares_and_saves(tmp_path, monkeypatch, capsys):
+    script, _ = scripts()
     work = [line for line in script.splitlines() if line and not line.startswith(("from ", "import "))]
     assert len(work) <= 20
     shutil.copytree(REPOSITORY / "corpora" / "mini", tmp_path / "corpora" / "mini")
@@ -21,3 +25,11 @@ def test_the_script_of_the_documentation_trains_compares_and_saves(tmp_path, mon
     assert (card.classifier, card.normalise, card.signers) == ("knn3", "signer", ("M1", "M2"))
     assert set(card.parameters) == {"metric", "weights"}
     assert str(dict(card.parameters)) in capsys.readouterr().out
+
+
+def test_the_script_of_stretches_and_tables_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {"__name__": "script"}
+    exec(compile(scripts()[1], "docs/scripting.md", "exec"), names)
+    assert names["weights"].time[[0, -1]].tolist() == [1.0, 3.995]
+    assert [file.name for file in tmp_path.iterdir()] == ["weights.parquet"]
