@@ -22,6 +22,8 @@
 **Annotate a recording**
 
 =========================== ==============================================================================
+`solve`                     The weights of a recording; `solve_pieces`, of one of any length
+`calibrate_signer`          What a signer's own bases are, from a take in which they are shown
 `segment`                   Weights cut into stable segments and transitions
 `energies`                  The energies of the weights' velocity and acceleration, on which they are cut
 `load_model`                A trained classifier: one that ships, or a file

@@ -28,6 +28,8 @@ from .settings.laboratory import read_settings
 from .settings.solve import SolveSettings
 from .settings.training import TrainingSettings
 from .signer import Signer
+from .solver.range_of_motion import calibrate_signer
+from .solver.solving import solve, solve_pieces
 from .takes.reading import open_recording, read_recording, read_take
 from .takes.take import Take
 
@@ -49,6 +51,7 @@ __all__ = [
     "TrainingSettings",
     "agreement_table",
     "annotate",
+    "calibrate_signer",
     "choose_layout",
     "datasets",
     "draw_face",
@@ -73,6 +76,8 @@ __all__ = [
     "run_corpus",
     "save_model",
     "segment",
+    "solve",
+    "solve_pieces",
     "write_eaf",
     "write_segments",
     "write_weights",

@@ -43,7 +43,7 @@ def test_a_script_of_the_gallery_is_short_and_uses_the_front_door(script):
     text = script.read_text(encoding="utf-8")
     assert "import signface as sf\n" in text
     assert not re.search(r"^from signface", text, flags=re.MULTILINE)
-    assert sum(1 for line in text.splitlines() if line.strip() and not line.startswith("#")) <= 50
+    assert sum(1 for line in text.splitlines() if line.strip() and not line.startswith("#")) <= 60
 
 
 def test_the_script_of_the_readme_runs(elsewhere, capsys):

@@ -39,12 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Learn the signer's bases and say which, and how far they are from the avatar's."""
-    import numpy as np
-
     from signface.descriptors import Descriptors
-    from signface.signer import Signer, SignerBases
-    from signface.solver.range_of_motion import calibrate_shown, read_shown
-    from signface.solver.solving import face_and_layout, prepare_take
+    from signface.solver.range_of_motion import away_from_avatar, calibrate_signer
+    from signface.solver.solving import face_and_layout
     from signface.takes.reading import open_recording
 
     if arguments.output.suffix.lower() not in (".csv", ".json"):
@@ -54,15 +51,9 @@ def run(arguments: argparse.Namespace) -> int:
         raise SignfaceError("holds weights, not markers", file=arguments.take)
     settings = settings_from(arguments, SolveSettings)
     face, layout = face_and_layout(recording.labels, settings)
-    shown = read_shown(arguments.shown, face.names)
-    prepared = prepare_take(recording, face, layout, settings=settings.changed(creep=bool(settings.creep)))
-    bases, learnt = calibrate_shown(
-        prepared.displacements, shown, face, prepared.layout, rate=recording.rate, start_s=recording.start
-    )
-    signer = Signer(arguments.signer, SignerBases.of(bases, learnt, face, prepared.layout))
+    signer = calibrate_signer(recording, arguments.shown, face, layout, name=arguments.signer, settings=settings)
     signer.save(arguments.output)
-    columns = [face.names.index(name) for name in learnt]
-    avatar = prepared.layout.bases(face)[columns]
-    apart = float(np.sqrt(((bases[columns] - avatar) ** 2).sum() / (avatar**2).sum()))
+    assert signer.bases is not None
+    learnt, apart = set(signer.bases.bases), away_from_avatar(signer.bases, face, layout)
     print(f"{arguments.output}: {len(learnt)} of {face.n_bases} bases, {apart:.0%} away from the avatar's")
     return 0

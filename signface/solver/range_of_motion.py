@@ -1,7 +1,9 @@
 """Calibrating a signer as a laboratory can: from a take in which named bases are shown, nobody knows how strongly.
 
+- `calibrate_signer`: a range-of-motion take to a `Signer`.
 - `Shown`: when which bases are shown; `read_shown` reads it from a table.
-- `calibrate_shown`: the signer's bases at the markers.
+- `calibrate_shown`: the signer's bases at the markers, from displacements.
+- `away_from_avatar`: how far they are from the avatar's.
 
 A range-of-motion take ("brows up, brows down, open the mouth, ...") says which base moves at a time, not how far. So
 strengths and bases are found in turns: strengths of the bases shown from the bases as known so far, within each
@@ -21,7 +23,11 @@ import numpy as np
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
+from signface.settings.solve import SolveSettings
+from signface.signer import Signer, SignerBases
 from signface.solver.calibration import calibrate
+from signface.solver.solving import face_and_layout, prepare_take
+from signface.takes.recording import Recording
 
 #: What the avatar's bases count beside those shown, see `signface.solver.calibration.calibrate`: twice as much as where
 #: strengths are known.
@@ -51,6 +57,81 @@ class Shown:
     start_s: float
     end_s: float
     bases: tuple[str, ...]
+
+
+def calibrate_signer(
+    recording: Recording,
+    shown: str | PathLike[str] | Sequence[Shown],
+    face: FaceModel | None = None,
+    layout: MarkerLayout | None = None,
+    *,
+    name: str = "",
+    settings: SolveSettings | None = None,
+) -> Signer:
+    """A signer with bases of their own, from a take in which named bases are shown.
+
+    Parameters
+    ----------
+    recording : Take or TakeFile
+        The range-of-motion take.
+    shown : path or sequence of Shown
+        What is shown when; a path is that of a table that `read_shown` reads.
+    face, layout : optional
+        In place of those that the settings name.
+    name : str
+        Who it is.
+    settings : SolveSettings, optional
+        How takes of the signer will be solved. Creep is taken away only where they ask for it: it would be learnt from
+        the very weights that are not known yet.
+
+    Returns
+    -------
+    Signer
+        `Signer.save` writes it.
+
+    Raises
+    ------
+    SignfaceError
+        The recording holds weights, the table is none or names a base that the face has not, or no window lies in the
+        take and shows a base that moves its markers.
+
+    See Also
+    --------
+    signface.solve : which takes the signer.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import signface as sf
+    >>> face = sf.read_face()
+    >>> layout = sf.read_layout("default-40", face)
+    >>> weights = np.zeros((100, face.n_bases))  # two seconds at 50 Hz: the jaw opens and closes
+    >>> weights[20:80, face.names.index("jawOpen")] = np.sin(np.linspace(0, np.pi, 60)) ** 2
+    >>> skin = layout.points(face) + np.tensordot(weights, 1.2 * layout.bases(face), axes=1)
+    >>> head = np.repeat(layout.points(face, layout.head_labels)[None], len(weights), axis=0)
+    >>> take = sf.Take(np.concatenate([skin, head], axis=1), (*layout.face_labels, *layout.head_labels), rate=50.0)
+    >>> eva = sf.calibrate_signer(take, [Shown(0.3, 1.7, ("jawOpen",))], name="Eva")
+    >>> eva.name, sorted(set(eva.bases.bases))
+    ('Eva', ['jawOpen'])
+    """
+    if not hasattr(recording, "labels"):
+        raise SignfaceError("holds weights, not markers", file=getattr(recording, "name", None))
+    settings = settings or SolveSettings()
+    face, layout = face_and_layout(recording.labels, settings, face, layout)
+    windows = read_shown(shown, face.names) if isinstance(shown, (str, PathLike)) else shown
+    prepared = prepare_take(recording, face, layout, settings=settings.changed(creep=bool(settings.creep)))
+    bases, learnt = calibrate_shown(
+        prepared.displacements, windows, face, prepared.layout, rate=recording.rate, start_s=recording.start
+    )
+    return Signer(name, SignerBases.of(bases, learnt, face, prepared.layout))
+
+
+def away_from_avatar(bases: SignerBases, face: FaceModel, layout: MarkerLayout) -> float:
+    """How far a signer's bases lie from the avatar's, as a share of these, over all markers of all that were learnt."""
+    columns = [face.names.index(name) for name in bases.bases]
+    rows = [layout.face_labels.index(marker) for marker in bases.markers]
+    avatar = layout.bases(face)[columns, rows]
+    return float(np.sqrt(((bases.displacements - avatar) ** 2).sum() / (avatar**2).sum()))
 
 
 def read_shown(path: str | PathLike[str], names: Sequence[str]) -> list[Shown]:

@@ -133,6 +133,17 @@ def solve_pieces(
     Yields
     ------
     Descriptors
+
+    See Also
+    --------
+    signface.write_weights : weights to disk.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> recording = sf.open_recording(sf.datasets.mini_file())
+    >>> [part.n_frames for part in solve_pieces(recording, piece=500)]
+    [500, 500, 184]
     """
     if isinstance(recording, Descriptors):
         yield recording

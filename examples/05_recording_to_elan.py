@@ -1,0 +1,22 @@
+"""
+From a recording to an ELAN file
+================================
+
+Ten lines: a recording is solved, cut, labelled and written, with its curves beside it.
+"""
+
+import signface as sf
+
+take = sf.read_take(sf.datasets.mini_file("M1_EU_11"))
+model = sf.load_model()
+settings = sf.SolveSettings(alpha=0.3)
+eva = sf.Signer("Eva")
+annotation = sf.annotate(take, model, settings=settings, signer=eva)
+files = sf.write_eaf(annotation, "take.eaf", replace=True)
+print(annotation)
+print("written:", *(file.name for file in files))
+
+# %%
+# What was found, at a glance; ``take.eaf`` opens in ELAN, with the same curves in its timeseries viewer.
+
+figure = sf.draw_timeline(annotation.descriptors, annotation.segments)
