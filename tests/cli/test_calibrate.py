@@ -52,6 +52,7 @@ def motion(face, layout, tmp_path_factory):
     return recorded(face, layout, weights, own, folder / "motion.c3d"), folder / "shown.csv", weights, own
 
 
+@pytest.mark.slow
 def test_a_calibrated_signer_is_solved_more_exactly(motion, tmp_path, capsys, layout, face):
     take, shown, weights, own = motion
     signer, plain, calibrated = (tmp_path / name for name in ("signer.csv", "plain.csv", "calibrated.csv"))

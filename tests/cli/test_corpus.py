@@ -101,6 +101,7 @@ def test_train_names_what_the_corpus_lacks(folder, tmp_path, capsys, options, pr
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_evaluate_writes_and_prints_both_kinds_of_signer(folder, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["evaluate", str(folder), "-o", str(out), "--train-kinds", "IE"]) == 0
@@ -123,6 +124,7 @@ def test_evaluate_writes_and_prints_both_kinds_of_signer(folder, tmp_path, capsy
     assert frames.tolist() == across["classifiers"]["knn1"]["frames"]["confusion"]
 
 
+@pytest.mark.slow
 def test_the_report_needs_nothing_outside_itself(folder, tmp_path):
     options = ["--train-kinds", "IE", "--protocol", "within", "--classifiers", "knn1", "--date", "some day"]
     assert main(["evaluate", str(folder), "-o", str(tmp_path / "out"), *options]) == 0
@@ -134,6 +136,7 @@ def test_the_report_needs_nothing_outside_itself(folder, tmp_path):
     assert "<link" not in page
 
 
+@pytest.mark.slow
 def test_metrics_say_what_was_chosen_in_each_fold_and_how_reliable_it_is(folder):
     examples = solve_examples(read_corpus(folder))
     settings = TrainingSettings(search=True, folds=2)

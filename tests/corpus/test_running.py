@@ -107,6 +107,7 @@ def start_run(corpus, ready, *options):
     return subprocess.Popen(command, cwd=REPOSITORY, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
+@pytest.mark.slow
 def test_a_run_that_was_killed_goes_on_and_ends_with_the_same_bytes(undisturbed, ready):
     feel, whole = undisturbed
     forget_run(feel)
@@ -126,6 +127,7 @@ def test_a_run_that_was_killed_goes_on_and_ends_with_the_same_bytes(undisturbed,
     assert written(feel) == whole
 
 
+@pytest.mark.slow
 def test_a_cluster_that_loses_a_worker_ends_with_the_same_bytes(undisturbed, ready):
     from distributed import LocalCluster
 
@@ -237,6 +239,7 @@ def die_of_seven(number: int) -> int:
     return number**2
 
 
+@pytest.mark.slow
 def test_a_job_that_kills_its_process_fails_alone():
     found = dict(on_cores(die_of_seven, list(range(20)), workers=2))
     assert isinstance(found.pop(7), WorkerDied)

@@ -267,6 +267,7 @@ def test_elan_runs_the_recogniser_in_a_bare_environment(tmp_path, machine):
     assert [span[1].text for span in root.iterfind("span")] == [row[2] for row in expected["affect-confidence"]]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="ELAN runs the .bat there")
 def test_a_failure_is_told_to_elan_in_its_own_words(tmp_path):
     write_extension(tmp_path / "signface")

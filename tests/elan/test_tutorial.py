@@ -81,6 +81,7 @@ def run(command: str, place: Path) -> str:
     return done.stdout
 
 
+@pytest.mark.slow
 def test_the_tutorial_can_be_followed(place):
     said = {}
     for heading, commands in steps():

@@ -77,7 +77,12 @@ def test_a_fingerprint_gives_a_take_away_to_who_has_seen_a_frame_of_it(prints):
     [
         ("within", ["IE", "SE"], {}),
         ("within", ["IE", "SE", "EU"], {"features": ("weights", "derivatives", "windows"), "normalise": "signer"}),
-        ("within", ["IE", "SE", "EU"], {"search": True, "calibrate": True, "folds": 2, "balanced": True}),
+        pytest.param(
+            "within",
+            ["IE", "SE", "EU"],
+            {"search": True, "calibrate": True, "folds": 2, "balanced": True},
+            marks=pytest.mark.slow,
+        ),
         ("across", ["IE", "SE", "EU"], {"normalise": "signer", "aggregate": "frames"}),
     ],
 )

@@ -60,6 +60,7 @@ def test_the_cost_of_a_curve_is_bounded(examples):
     assert sum(counted) <= 60
 
 
+@pytest.mark.slow
 def test_a_curve_repeats_with_its_seed(examples):
     drawn, curves = [], []
     for seed in (1, 1, 2):
