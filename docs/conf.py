@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import re
 import shutil
+import sys
 from importlib.metadata import version as installed_version
 from pathlib import Path
 from typing import Any
@@ -55,6 +56,7 @@ html_copy_source = False
 html_show_sphinx = False
 
 HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))  # for gallery_figures
 
 #: The gallery's scripts run in a copy of their folder: what they write does not land in the repository.
 EXAMPLES = HERE / "_build" / "examples"
@@ -62,6 +64,7 @@ shutil.rmtree(EXAMPLES, ignore_errors=True)
 shutil.copytree(HERE.parent / "examples", EXAMPLES)
 
 sphinx_gallery_conf = {
+    "image_scrapers": ("matplotlib", "gallery_figures.figures_without_pyplot"),
     "examples_dirs": str(EXAMPLES),
     "gallery_dirs": "gallery",
     "filename_pattern": r"\.py$",
@@ -75,6 +78,8 @@ sphinx_gallery_conf = {
     "remove_config_comments": True,
     "notebook_extensions": set(),
 }
+
+COLON = "\N{RATIO}"
 
 #: Rooms that are no part of a script's world: the command line is described in files.md.
 UNLISTED = {"cli", "__main__"}
@@ -145,7 +150,7 @@ def _room_pages(folder: Path, name: str) -> dict[str, str]:
 
 
 def _module_page(name: str) -> str:
-    return "\n".join([*_heading(name), f".. automodule:: {name}", "   :members:", "   :show-inheritance:", ""])
+    return "\n".join([*_heading(name), f".. automodule:: {name}", "   :members:", ""])
 
 
 def _heading(name: str) -> list[str]:
@@ -177,8 +182,13 @@ def mend_docstring(app: Any, what: str, name: str, thing: object, options: Any, 
         if what == "module" and block and line.endswith(":") and not line.endswith("::"):
             line += ":"  # an indented block after a colon is text as it stands
         lines[number] = line
-    if what in ("data", "attribute") and lines:
-        lines[0] = lines[0].replace(": ", "\\: ", 1)  # "name: what it is" names no type
+    if what in ("data", "attribute"):
+        lines[:] = [line.replace(":", COLON) for line in lines]
+
+
+def restore_colons(app: Any, what: str, name: str, thing: object, options: Any, lines: list[str]) -> None:
+    """Put back what `mend_docstring` hid from napoleon, which takes what stands before a colon for a type."""
+    lines[:] = [line.replace(COLON, ":") for line in lines]
 
 
 def skip_generated(app: Any, what: str, name: str, thing: object, skip: bool, options: Any) -> bool | None:
@@ -190,4 +200,5 @@ def setup(app: Any) -> None:
     """Called by Sphinx before anything is read."""
     write_api_pages()
     app.connect("autodoc-process-docstring", mend_docstring, priority=400)  # before napoleon
+    app.connect("autodoc-process-docstring", restore_colons, priority=600)  # after it
     app.connect("autodoc-skip-member", skip_generated)
