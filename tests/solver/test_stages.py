@@ -6,6 +6,7 @@ import pytest
 from signface.face.layout_files import read_layout
 from signface.solver.creep import Creep
 from signface.solver.displacements import NEUTRAL_WINDOW_S, Displacements, neutral_places
+from signface.solver.preparation import Preparation
 from signface.takes.reading import read_take
 from signface.takes.recording import pieces
 from signface.takes.stabilisation import HeadMotion, NeutralAlignment
@@ -89,3 +90,19 @@ def test_neutral_places_are_medians_of_what_is_seen(mini):
     assert seen == (take.labels[3], take.labels[5])
     np.testing.assert_allclose(places[0], np.median(take.positions[100 - half : 100 + half + 1, 3], axis=0))
     assert np.linalg.norm(places[1] - take.positions[100, 5]) < 1.0
+
+
+def test_a_preparation_is_its_stages_one_after_the_other(mini, face, layout):
+    take = read_take(mini.takes[1].path)
+    preparation = Preparation(take, face, layout, piece=500)
+    block = Block(take.positions, range(take.n_frames))
+    for stage in preparation.stages:
+        block = stage.apply(block)
+    displacements, head = preparation.frames(0, take.n_frames)
+    np.testing.assert_allclose(block.positions, displacements, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(block.head, head, rtol=0, atol=1e-9)
+    assert [type(stage).__name__ for stage in preparation.stages if not stage.causal] == [
+        "GapFiller",
+        "Lowpass",
+        "HeadMotion",
+    ]
