@@ -24,7 +24,7 @@ from signface.evaluation.protocol import score_model
 from signface.files import whole_file
 from signface.label.model import Card
 from signface.label.persistence import save_model
-from signface.label.vocabulary import AFFECTS
+from signface.label.vocabulary import AFFECT
 from signface.learn.training import Example, train_model
 from signface.progress import progress
 from signface.settings.choices import NAMES, SEQUENCE_NAMES
@@ -96,10 +96,11 @@ def card_text(name: str, card: Card, sections: dict) -> str:
     )
     truth = sections["manual_segments"]
     recalls = "\n".join(
-        f"| {label} ({AFFECTS[label]}) | {sum(row)} | {row[i] / sum(row):.2f} |"
+        f"| {label} ({AFFECT.describe(label)}) | {sum(row)} | {row[i] / sum(row):.2f} |"
         for i, (label, row) in enumerate(zip(truth["labels"], truth["confusion"], strict=True))
         if sum(row)
     )
+    labels = ", ".join(f"{value} ({words})" for value, words in AFFECT.descriptions.items() if value in card.labels)
     boundaries = ", ".join(
         f"{value:.2f} within {tolerance} s" for tolerance, value in sections["segmentation"]["boundary_f1"].items()
     )
@@ -114,7 +115,7 @@ recorded: {len(card.takes)} takes of the kinds {" and ".join(card.kinds)} by {le
 of people, take its labels as a first guess to be corrected, and train your own from your corrections:
 `signface train CORPUS -o MODEL`.
 
-It labels the expressions {", ".join(f"{label} ({AFFECTS[label]})" for label in AFFECTS if label in card.labels)}.
+It labels the expressions {labels}.
 
 ## Measured
 

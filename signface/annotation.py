@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from signface.face.layout import MarkerLayout
     from signface.face.model import FaceModel
     from signface.label.model import Card, TrainedModel
+    from signface.label.vocabulary import Vocabulary
     from signface.segmentation.segments import Segments
     from signface.settings.eaf import EafOptions
     from signface.settings.solve import SolveSettings
@@ -89,6 +90,18 @@ class Annotation(Content):
         """How the take was solved; None where it was not (weights of a phone), or nobody knows."""
         return self.descriptors.settings
 
+    @property
+    def tier(self) -> str:
+        """What was labelled: `affect`, or the tier that the model was trained on."""
+        return "affect" if self.card is None else self.card.tier
+
+    @property
+    def vocabulary(self) -> Vocabulary:
+        """What the labels stand for."""
+        from signface.label.vocabulary import AFFECT
+
+        return AFFECT if self.card is None else self.card.vocabulary
+
     @cached_property
     def curves(self) -> pd.DataFrame:
         """Energies, confidence, some weights and the residual, every 10 ms (`segmentation.curves.curves_table`).
@@ -130,8 +143,6 @@ class Annotation(Content):
         return f"<Annotation of {self.name}: {stable}{channels}, by {self.model}>"
 
     def __str__(self) -> str:
-        from signface.label.vocabulary import AFFECTS
-
         table = self.segments.table
         stable = table[table["kind"] == "stable"]
         seconds = (stable["end_s"] - stable["start_s"]).rename("seconds")
@@ -139,7 +150,7 @@ class Annotation(Content):
         for label, total in seconds.groupby(stable["label"]).sum().sort_values(ascending=False).items():
             rows = stable["label"] == label
             confidence = np.average(stable.loc[rows, "confidence"], weights=seconds[rows])
-            parts.append(f"{AFFECTS.get(str(label), str(label))} {total:.1f} s (confidence {confidence:.0%})")
+            parts.append(f"{self.vocabulary.describe(str(label))} {total:.1f} s (confidence {confidence:.0%})")
         residual = self.residual_mm
         fit = "" if residual is None else f"; the solved face lies {residual:.2f} mm from the markers (median residual)"
         duration = f"{self.descriptors.duration:.1f} s"
@@ -215,7 +226,7 @@ def annotate(
             channels if isinstance(channels, Mapping) else read_channels("default" if channels is True else channels)
         )
         events = {event.channel: event for event in find_channels(descriptors, thresholds)}
-        if "intensity" in thresholds and "intensity" not in segments.table:
+        if "intensity" in thresholds and "intensity" not in segments.table and model.card.tier == "affect":
             segments = find_intensities(descriptors, segments, thresholds)
     return Annotation(descriptors, segments, model.name, events, signer, model.card)
 

@@ -9,7 +9,7 @@ import pytest
 from lxml import etree
 
 from signface.cli.main import main
-from signface.label.vocabulary import AFFECTS, is_transition
+from signface.label.vocabulary import AFFECT
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def signer_eaf(signer_pose, tmp_path_factory):
 def test_a_real_signer_becomes_a_valid_eaf_with_labelled_segments(signer_eaf, eaf_schema):
     eaf_schema.assertValid(etree.parse(str(signer_eaf)))
     rows = sorted(pympi.Eaf(str(signer_eaf)).get_annotation_data_for_tier("affect@S1"))
-    assert all(row[2] in AFFECTS or is_transition(row[2]) for row in rows)
+    assert all(row[2] in AFFECT.values or AFFECT.is_transition(row[2]) for row in rows)
     assert rows[0][0] == 0
     assert rows[-1][1] == pytest.approx(130 / 30 * 1000, abs=1)
     assert all(end == start for (_, end, *_), (start, *_) in itertools.pairwise(rows))

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from signface.elan.channels import COLOURS
 from signface.elan.curves import CURVES
 from signface.elan.reference import read_tiers
-from signface.label.vocabulary import AFFECTS, is_transition
+from signface.label.vocabulary import AFFECT
 from signface.report.colours import colour_of, ink_on
 from signface.report.timeline import save_figure
 
@@ -41,7 +41,7 @@ def draw_tiers(eaf: Path, curves: Path) -> Figure:
     for row, rows in enumerate(tiers.values()):
         values = {value: number for number, value in enumerate(dict.fromkeys(rows["label"]))}
         for start, end, label in rows[["start_s", "end_s", "label"]].itertuples(index=False):
-            known = label in AFFECTS or is_transition(label)
+            known = label in AFFECT.values or AFFECT.is_transition(label)
             colour = colour_of(label) if known else [part / 255 for part in COLOURS[values[label] % len(COLOURS)]]
             lower.barh(row, end - start, left=start, height=0.8, color=colour, edgecolor="grey", linewidth=0.4)
             if end - start > 0.06 * max(1, len(label)):

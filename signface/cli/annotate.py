@@ -147,6 +147,8 @@ def save_picture(annotation: Annotation, face: FaceModel, path: Path) -> None:
     from signface.report.timeline import draw_timeline, save_figure
 
     if annotation.descriptors.names == face.names:
-        save_figure(draw_overview(annotation.descriptors, annotation.segments, face), path)
+        save_figure(
+            draw_overview(annotation.descriptors, annotation.segments, face, vocabulary=annotation.vocabulary), path
+        )
     else:
-        save_figure(draw_timeline(annotation.descriptors, annotation.segments), path)
+        save_figure(draw_timeline(annotation.descriptors, annotation.segments, vocabulary=annotation.vocabulary), path)

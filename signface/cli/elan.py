@@ -276,7 +276,7 @@ def recognise(arguments: argparse.Namespace) -> int:
 def _recognise(xml: bytes) -> None:
     from signface.annotation import annotate
     from signface.elan.recogniser import progress_line, read_parameters, write_tier_file
-    from signface.elan.tiers import affect_tier
+    from signface.elan.tiers import label_tier
     from signface.label.persistence import load_model
     from signface.settings.laboratory import read_settings
     from signface.signer import Signer
@@ -297,6 +297,7 @@ def _recognise(xml: bytes) -> None:
     print(progress_line(0.2, "solving"), flush=True)
     annotation = annotate(recording, model, settings=settings, signer=signer)
     print(progress_line(0.9, "writing"), flush=True)
-    tier = affect_tier(annotation.segments, annotation.signer.name)
-    write_tier_file(chosen["tiers"], tier, with_dependents=("affect-confidence",))
+    channel, vocabulary = annotation.tier, annotation.vocabulary
+    tier = label_tier(annotation.segments, annotation.signer.name, channel=channel, vocabulary=vocabulary)
+    write_tier_file(chosen["tiers"], tier, with_dependents=(f"{channel}-confidence",))
     print(f"INFO: {annotation}", flush=True)

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from signface.cli.options import add_solve_arguments, settings_from, words
-from signface.cli.train import add_training_arguments, training_settings
+from signface.cli.train import add_tier_arguments, add_training_arguments, tier_options, training_settings
 from signface.errors import SignfaceError
 from signface.progress import progress
 from signface.settings.choices import NAMES, SEQUENCE_NAMES
@@ -70,6 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--date", metavar="WORDS", help="date to print on the report (default: none, so that its bytes repeat)"
     )
     parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")
+    add_tier_arguments(parser)
     add_solve_arguments(parser)
 
 
@@ -98,6 +99,7 @@ def run(arguments: argparse.Namespace) -> None:
     examples = solve_examples(
         corpus,
         settings=solve,
+        **tier_options(arguments),
         progress=lambda items: progress(items, "solving", total=sum(t.annotation is not None for t in corpus)),
     )
     metrics, segments = measure(

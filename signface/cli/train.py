@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from signface.cli.options import add_solve_arguments, settings_from, words
 from signface.errors import SignfaceError
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 EXAMPLE = """  signface train corpora/feel -o mine.skops
   signface train corpora/feel -o mine.skops --classifier svm-rbf --kinds IE,SE --signer each
+  signface train corpora/lab -o brows.skops --tier brows --vocabulary brows.txt
   signface train corpora/feel -o mine.skops --normalise signer --features weights,windows --search"""
 
 
@@ -48,6 +49,34 @@ def add_training_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_tier_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what `train` and `evaluate` can be told of the tier that was annotated; see `tier_options`."""
+    parser.add_argument(
+        "--tier", default="affect", metavar="NAME", help="the tier annotated: NAME@SIGNER or NAME (default: affect)"
+    )
+    parser.add_argument(
+        "--vocabulary",
+        type=Path,
+        metavar="FILE",
+        help="its labels: a .txt with one a line, or the .eaf, .etf or .ecv that has them (default: the tier's own)",
+    )
+    parser.add_argument(
+        "--sparse",
+        action="store_true",
+        help="what is not annotated is unknown (default: none, unless transitions are annotated)",
+    )
+
+
+def tier_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The options of `solve_examples` that `add_tier_arguments` asks for."""
+    vocabulary = None
+    if arguments.vocabulary is not None:
+        from signface.elan.vocabularies import read_vocabulary
+
+        vocabulary = read_vocabulary(arguments.vocabulary)
+    return {"tier": arguments.tier, "vocabulary": vocabulary, "sparse": arguments.sparse}
+
+
 def training_settings(arguments: argparse.Namespace) -> TrainingSettings:
     """The settings that a command was given, of `add_training_arguments`, `--classifier`, `--calibrate`, `--seed`."""
     from signface.settings.training import TrainingSettings
@@ -76,6 +105,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="train on parts of the takes too, to score the rest and to calibrate confidences (default: yes)",
     )
     parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")
+    add_tier_arguments(parser)
     add_solve_arguments(parser)
 
 
@@ -103,6 +133,7 @@ def run(arguments: argparse.Namespace) -> None:
     examples = solve_examples(
         corpus,
         settings=solve,
+        **tier_options(arguments),
         progress=lambda items: progress(items, "solving", total=annotated),
     )
     groups = {output: examples}

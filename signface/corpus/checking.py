@@ -222,7 +222,7 @@ def _problems_of_markers(entry: TakeEntry, recipe: Recipe, take: Take) -> list[s
 def _problems_of_reference(entry: TakeEntry, signers: frozenset[str], span: tuple[float, float] | None) -> list[str]:
     """What is wrong with a reference annotation, by itself and beside its take (start and end in seconds)."""
     from signface.elan.reference import read_reference, read_tiers
-    from signface.elan.vocabularies import AFFECT
+    from signface.label.vocabulary import AFFECT, Vocabulary
 
     file = entry.annotation
     assert file is not None
@@ -234,7 +234,8 @@ def _problems_of_reference(entry: TakeEntry, signers: frozenset[str], span: tupl
         own = next((tiers[name] for name in (f"affect@{entry.signer}", "affect") if name in tiers), None)
         foreign: list[str] = []
         if own is not None:
-            foreign = [label for label in dict.fromkeys(own["label"].str.strip()) if label not in AFFECT.values]
+            annotated = tuple(dict.fromkeys(own["label"].str.strip()))
+            foreign = [label for label in annotated if label not in AFFECT.allowed]
         try:
             reference = read_reference(file, entry.signer)
         except SignfaceError:
@@ -244,7 +245,7 @@ def _problems_of_reference(entry: TakeEntry, signers: frozenset[str], span: tupl
                 f"{file}: the labels {', '.join(map(repr, foreign))} on the tier of {entry.signer} are not in the "
                 "vocabulary. Stable labels are N A D F J Sa Su; transitions join two of them, as NA"
             )
-            reference = read_reference(file, entry.signer, labels=[*AFFECT.values, *foreign])
+            reference = read_reference(file, entry.signer, vocabulary=Vocabulary("annotated", annotated))
     except SignfaceError as error:
         return [*problems, str(error)]
     table = reference.table

@@ -12,9 +12,15 @@ from signface.corpus.describing import recipe_of, stored_or_solved
 from signface.corpus.manifest import Corpus, TakeEntry
 from signface.corpus.origin import Origin, Recipe, find_origin, make_recipe
 from signface.corpus.store import DescriptorStore, open_store
+from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
+from signface.label.vocabulary import Vocabulary
 from signface.learn.examples import Example
+from signface.segmentation.segments import Segments
 from signface.settings.solve import SolveSettings
+
+#: The label of what nobody annotated.
+NONE = "none"
 
 #: Takes solved at the same time.
 WORKERS = 2
@@ -24,8 +30,11 @@ def solve_examples(
     corpus: Corpus,
     *,
     settings: SolveSettings | None = None,
+    tier: str = "affect",
+    vocabulary: Vocabulary | None = None,
+    sparse: bool = False,
     workers: int = WORKERS,
-    progress: Callable[[Iterable[Example]], Iterable[Example]] = iter,
+    progress: Callable[[Iterable[Descriptors]], Iterable[Descriptors]] = iter,
 ) -> list[Example]:
     """Descriptors of the annotated takes of a corpus, with their reference annotations.
 
@@ -38,10 +47,17 @@ def solve_examples(
     settings : SolveSettings, optional
         How takes are solved; rows that name a face, a layout or a neutral frame have their own, and signers with a
         file in the folder `signers` their own bases.
+    tier : str
+        What was annotated: the part of a tier's name before `@`, or the whole name of a tier of one signer.
+    vocabulary : Vocabulary, optional
+        The labels allowed; by default as `signface.elan.reference.reference_vocabulary` finds them.
+    sparse : bool
+        What is not annotated is unknown. Otherwise, on a tier whose vocabulary has no transitions, it is `none`, which
+        is added to the vocabulary.
     workers : int
         Takes solved at the same time, each in a process of its own.
     progress : callable, optional
-        Wraps the iterator of examples, to show how far it is.
+        Wraps the iterator of descriptors, to show how far it is.
 
     Returns
     -------
@@ -64,38 +80,63 @@ def solve_examples(
     recipe = make_recipe(settings)
     known: dict[tuple[str, str | None], Recipe] = {}
     origins = [find_origin(entry, corpus.folder, recipe_of(entry, recipe, known)) for entry in entries]
-    return list(progress(_examples(entries, origins, store, workers, corpus.folder)))
+    references, vocabulary = _references(entries, tier, vocabulary)
+    named = tier.partition("@")[0]
+    blank = not (sparse or vocabulary.transitions)
+    if blank:
+        vocabulary = vocabulary.with_blank(NONE)
+    solved = progress(_described(entries, origins, store, workers, corpus.folder))
+    examples = []
+    for entry, origin, reference, descriptors in zip(entries, origins, references, solved, strict=True):
+        end = descriptors.start + descriptors.duration
+        examples.append(
+            Example(
+                take=origin.take,
+                signer=entry.signer,
+                kind=entry.kind,
+                descriptors=descriptors,
+                reference=reference.filled(descriptors.start, end, NONE) if blank else reference,
+                sentence=entry.sentence,
+                vocabulary=vocabulary,
+                tier=named,
+            )
+        )
+    return examples
 
 
-def _examples(
+def _references(
+    entries: list[TakeEntry], tier: str, vocabulary: Vocabulary | None
+) -> tuple[list[Segments], Vocabulary]:
+    """The reference of each take, and their vocabulary."""
+    from signface.elan.reference import read_reference, reference_vocabulary
+
+    files = [(entry.annotation, entry.signer) for entry in entries if entry.annotation is not None]
+    if vocabulary is None:
+        vocabulary = reference_vocabulary(files, tier)
+    references = []
+    for file, signer in files:
+        reference = read_reference(file, signer, tier=tier, vocabulary=vocabulary)
+        if reference.table.empty:
+            raise SignfaceError(
+                f"its reference annotation is empty (signer {signer})",
+                file=file,
+                hint="annotate the take, or leave out its annotation in takes.csv",
+            )
+        references.append(reference)
+    return references, vocabulary
+
+
+def _described(
     entries: list[TakeEntry], origins: list[Origin], store: DescriptorStore | None, workers: int, folder: Path
-) -> Iterator[Example]:
-    """The examples in order: those of the store at once, the others as they are solved."""
+) -> Iterator[Descriptors]:
+    """The descriptors in order: those of the store at once, the others as they are solved."""
     from joblib import Parallel, delayed
 
-    from signface.elan.reference import read_reference
-
-    found = [None if store is None else store.read(origin) for origin in origins]
-    missing = [(e, o) for e, o, descriptors in zip(entries, origins, found, strict=True) if descriptors is None]
+    stored = [None if store is None else store.read(origin) for origin in origins]
+    missing = [(e, o) for e, o, descriptors in zip(entries, origins, stored, strict=True) if descriptors is None]
     jobs = (delayed(stored_or_solved)(entry, origin, store, folder) for entry, origin in missing)
     solved = iter(())
     if missing:
         solved = Parallel(n_jobs=min(workers, len(missing)), return_as="generator")(jobs)
-    for entry, origin, stored in zip(entries, origins, found, strict=True):
-        descriptors = next(solved)[0] if stored is None else stored
-        assert entry.annotation is not None
-        reference = read_reference(entry.annotation, entry.signer)
-        if reference.table.empty:
-            raise SignfaceError(
-                f"its reference annotation is empty (signer {entry.signer})",
-                file=entry.annotation,
-                hint="annotate the take, or leave out its annotation in takes.csv",
-            )
-        yield Example(
-            take=origin.take,
-            signer=entry.signer,
-            kind=entry.kind,
-            descriptors=descriptors,
-            reference=reference,
-            sentence=entry.sentence,
-        )
+    for descriptors in stored:
+        yield next(solved)[0] if descriptors is None else descriptors

@@ -7,7 +7,7 @@ Reading
     `reference.read_reference`, `reference.read_tiers`, `reference.read_corrections`, `document.read_document`,
     `checking.check_document`
 What a tier holds
-    `tiers.Tier`, `tiers.affect_tier`, `tiers.doubtful_tier`, `channels.channel_tiers`, `vocabularies.AFFECT`
+    `tiers.Tier`, `tiers.label_tier`, `tiers.doubtful_tier`, `channels.channel_tiers`, `vocabularies.read_vocabulary`
 A lab's own tiers
     `mapping.read_mapping`, `mapping.suggest_mapping`
 Run by ELAN

@@ -3,23 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import cycle
 
 import numpy as np
 
 from signface.channels.events import ChannelEvents
 from signface.elan.tiers import DependentTier, Tier, milliseconds
-from signface.elan.vocabularies import Entry, Vocabulary
-
-#: Okabe and Ito's colours, in turn for the values of a channel.
-COLOURS = (
-    (230, 159, 0),
-    (86, 180, 233),
-    (0, 158, 115),
-    (240, 228, 66),
-    (0, 114, 178),
-    (213, 94, 0),
-    (204, 121, 167),
-)
+from signface.label.vocabulary import PALETTE, Vocabulary
 
 
 def channel_tiers(channels: Iterable[ChannelEvents], signer: str = "") -> list[Tier]:
@@ -50,8 +40,5 @@ def channel_tiers(channels: Iterable[ChannelEvents], signer: str = "") -> list[T
 
 def vocabulary_of(channel: ChannelEvents) -> Vocabulary:
     """The closed vocabulary of a channel."""
-    entries = (
-        Entry(value, description, COLOURS[number % len(COLOURS)])
-        for number, (value, description) in enumerate(channel.values.items())
-    )
-    return Vocabulary(channel.channel, channel.description, tuple(entries))
+    colours = dict(zip(channel.values, cycle(PALETTE)))
+    return Vocabulary(channel.channel, tuple(channel.values), channel.values, colours, description=channel.description)

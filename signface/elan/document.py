@@ -1,6 +1,6 @@
 """EAF as XML: safe reading, whole writing, links to media, and the record of what signface wrote.
 
-- `read_document`: the tree of an EAF 2.5 to 3.0, or one clear error.
+- `read_document`: the tree of an EAF 2.5 to 3.0, or one clear error; `parse_xml`: of any of ELAN's files.
 - `write_document`: indented UTF-8, whole or not at all.
 - `link_urls`: absolute and relative URL of a linked file, as ELAN resolves them.
 - `written_record`, `recorded`: what signface wrote on a tier, kept in the header so that corrections can be told.
@@ -43,6 +43,32 @@ def read_document(path: str | PathLike[str]) -> etree._ElementTree:
         The file is missing, is not XML, declares entities of its own, is not an EAF, or has times that are no numbers.
     """
     file = Path(path)
+    tree = parse_xml(file)
+    root = tree.getroot()
+    if root.tag != "ANNOTATION_DOCUMENT":
+        raise SignfaceError(f"is XML but no EAF (its root is {root.tag})", file=file)
+    for part in ("HEADER", "TIME_ORDER"):
+        if root.find(part) is None:
+            raise SignfaceError(f"is no complete EAF (no {part})", file=file)
+    for slot in root.iterfind("TIME_ORDER/TIME_SLOT"):
+        value = slot.get("TIME_VALUE")
+        if value is not None and not value.strip().isdecimal():
+            raise SignfaceError(
+                f"time slot {slot.get('TIME_SLOT_ID')} has the time {value!r}, which is no count of milliseconds",
+                file=file,
+            )
+    return tree
+
+
+def parse_xml(path: str | PathLike[str]) -> etree._ElementTree:
+    """Parse any of ELAN's files without resolving entities or touching the network.
+
+    Raises
+    ------
+    SignfaceError
+        The file is missing, is not XML, or declares entities of its own.
+    """
+    file = Path(path)
     if file.is_dir():
         raise SignfaceError("is a folder, not an EAF", file=file)
     # Entities are refused, not resolved: an EAF has no use for them, and a nested one can fill the memory.
@@ -63,19 +89,6 @@ def read_document(path: str | PathLike[str]) -> etree._ElementTree:
         ) from error
     if tree.docinfo.internalDTD is not None:
         raise SignfaceError("declares a document type or entities of its own, which no EAF does", file=file)
-    root = tree.getroot()
-    if root.tag != "ANNOTATION_DOCUMENT":
-        raise SignfaceError(f"is XML but no EAF (its root is {root.tag})", file=file)
-    for part in ("HEADER", "TIME_ORDER"):
-        if root.find(part) is None:
-            raise SignfaceError(f"is no complete EAF (no {part})", file=file)
-    for slot in root.iterfind("TIME_ORDER/TIME_SLOT"):
-        value = slot.get("TIME_VALUE")
-        if value is not None and not value.strip().isdecimal():
-            raise SignfaceError(
-                f"time slot {slot.get('TIME_SLOT_ID')} has the time {value!r}, which is no count of milliseconds",
-                file=file,
-            )
     return tree
 
 

@@ -18,7 +18,7 @@ from lxml import etree
 
 from signface.elan.document import link_urls
 from signface.elan.tiers import clean_name
-from signface.elan.vocabularies import Vocabulary
+from signface.label.vocabulary import Vocabulary
 
 LANGUAGE = {
     "LANG_ID": "eng",
@@ -160,12 +160,17 @@ def type_element(name: str, vocabulary: str | None, *, dependent: bool) -> etree
     return element
 
 
+def entry_identifier(value: str) -> str:
+    """The `CVE_ID` of a value; it depends on the value only, so that two runs write the same file."""
+    return "cveid_" + "".join(c if c.isascii() and c.isalnum() else f"_{ord(c):x}_" for c in value)
+
+
 def vocabulary_element(vocabulary: Vocabulary, name: str) -> etree._Element:
     """CONTROLLED_VOCABULARY of a name, with multilingual entries (EAF 2.8 and later)."""
     element = etree.Element("CONTROLLED_VOCABULARY", CV_ID=name)
     etree.SubElement(element, "DESCRIPTION", LANG_REF=LANGUAGE["LANG_ID"]).text = vocabulary.description
     for entry in vocabulary.entries:
-        item = etree.SubElement(element, "CV_ENTRY_ML", CVE_ID=entry.identifier)
+        item = etree.SubElement(element, "CV_ENTRY_ML", CVE_ID=entry_identifier(entry.value))
         value = etree.SubElement(item, "CVE_VALUE", LANG_REF=LANGUAGE["LANG_ID"])
         if entry.description:
             value.set("DESCRIPTION", entry.description)

@@ -31,10 +31,9 @@ from lxml import etree
 from signface.channels.events import ChannelEvents
 from signface.elan.channels import vocabulary_of
 from signface.elan.document import read_document
-from signface.elan.vocabularies import AFFECT, INTENSITY, Vocabulary
 from signface.errors import SignfaceError
 from signface.files import whole_file
-from signface.label.vocabulary import is_transition
+from signface.label.vocabulary import AFFECT, INTENSITY, Vocabulary
 
 
 @dataclass(frozen=True)
@@ -55,11 +54,11 @@ class ChannelRule:
     labels: MappingABC[str, str] = field(default_factory=dict)
     transitions: str | None = None
 
-    def value(self, label: str) -> str | None:
+    def value(self, label: str, vocabulary: Vocabulary = AFFECT) -> str | None:
         """The lab's value of a label; None when the annotation is left out."""
         if label in self.labels:
             return self.labels[label] or None
-        if self.transitions is not None and is_transition(label):
+        if self.transitions is not None and vocabulary.is_transition(label):
             return self.transitions or None
         return label
 
@@ -169,11 +168,11 @@ def suggest_mapping(root: etree._Element, vocabularies: MappingABC[str, Vocabula
         if vocabulary is None or values is None:
             continue
         lines.append(f"# {tier} holds one of: {', '.join(values)}")
-        if channel in ("affect", "affect-doubtful") and not any(is_transition(value) for value in values):
+        if channel in ("affect", "affect-doubtful") and not any(AFFECT.is_transition(value) for value in values):
             lines.append('transitions = ""  # the vocabulary has no transitions: they are left out')
         lines.append(f"[{channel}.labels]")
         for entry in vocabulary.entries:
-            if channel in ("affect", "affect-doubtful") and is_transition(entry.value):
+            if channel in ("affect", "affect-doubtful") and AFFECT.is_transition(entry.value):
                 continue
             value = _closest_value(entry.value, entry.description, values)
             lines.append(

@@ -29,6 +29,7 @@ from signface.elan.elements import (
     TimeSlots,
     aligned_annotations,
     dependent_annotations,
+    entry_identifier,
     tier_element,
     type_element,
     vocabulary_element,
@@ -36,8 +37,8 @@ from signface.elan.elements import (
 from signface.elan.mapping import ChannelRule, Mapping, closed_entries, stereotype
 from signface.elan.tiers import Tier, clean_name, tier_name
 from signface.elan.upgrade import insert_in_order
-from signface.elan.vocabularies import Vocabulary
 from signface.errors import SignfaceError
+from signface.label.vocabulary import AFFECT, Vocabulary
 
 
 @dataclass
@@ -183,7 +184,7 @@ def _target(
                 hint="map it to a tier without a parent"
                 + ("" if parent is None else f", or one associated with {parent.tier_id}"),
             )
-    values = [None if label is None else rule.value(label) for label in labels]
+    values = [None if label is None else rule.value(label, tier.vocabulary or AFFECT) for label in labels]
     if parent is not None:  # an annotation that is left out takes what hangs on it along
         values = [None if above is None else value for above, value in zip(parent.values, values)]
     entries = None if element is None else closed_entries(root, element)
@@ -201,7 +202,7 @@ def _target(
         if value is not None
     ]
     if element is None:
-        entries = {entry.value: entry.identifier for entry in vocabulary.entries} if vocabulary else {}
+        entries = {value: entry_identifier(value) for value in vocabulary.allowed} if vocabulary else {}
     return _Target(
         channel,
         tier_id,
@@ -321,7 +322,7 @@ def _vocabulary(root: etree._Element, target: _Target) -> str | None:
             insert_in_order(root, vocabulary_element(vocabulary, name))
             return name
         entries = {entry.get("CVE_ID") for entry in element.iterfind("CV_ENTRY_ML")}
-        if entries >= {entry.identifier for entry in vocabulary.entries}:
+        if entries >= {entry_identifier(value) for value in vocabulary.allowed}:
             return name
     raise SignfaceError(f"has vocabularies named {vocabulary.name} of another kind", hint="rename them in ELAN")
 

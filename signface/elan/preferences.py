@@ -15,6 +15,7 @@ from lxml import etree
 
 from signface.elan.curves import panels
 from signface.elan.document import XSI, write_document
+from signface.elan.elements import entry_identifier
 from signface.elan.tiers import Tier
 
 PREFERENCES_SCHEMA = "http://www.mpi.nl/tools/elan/Prefs_v1.1.xsd"
@@ -53,7 +54,7 @@ def write_preferences(
             entries = etree.SubElement(group, "prefGroup", key=vocabulary.name)
             for entry in coloured:
                 preference = etree.SubElement(
-                    etree.SubElement(entries, "prefGroup", key=entry.identifier), "pref", key="Color"
+                    etree.SubElement(entries, "prefGroup", key=entry_identifier(entry.value)), "pref", key="Color"
                 )
                 colour = etree.SubElement(preference, "Object")
                 colour.set("class", "java.awt.Color")

@@ -1,8 +1,8 @@
 """What annotators wrote, as tables.
 
-- `read_reference`: the affect tier of a signer, as segments.
+- `read_reference`: the affect tier of a signer, or another one, as segments; `reference_vocabulary`: of a corpus.
 - `read_tiers`: every independent tier; `read_annotators`: those of several files, under short names.
-- `read_corrections`: the affect tier as signface wrote it, and as it is now.
+- `read_corrections`: a tier as signface wrote it, and as it is now.
 """
 
 from __future__ import annotations
@@ -13,20 +13,25 @@ from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 from lxml import etree
 
 from signface.elan.checking import check_document
 from signface.elan.document import CHANNEL_PREFIX, Row, read_document, recorded, tier_rows
 from signface.elan.tiers import clean_name, tier_name
-from signface.elan.vocabularies import AFFECT, INTENSITY
+from signface.elan.vocabularies import vocabulary_of_tier
 from signface.errors import SignfaceError
-from signface.label.vocabulary import AFFECTS
+from signface.label.vocabulary import AFFECT, INTENSITY, Vocabulary
 from signface.segmentation.segments import Segments
 
 
 def read_reference(
-    eaf: str | PathLike[str], signer: str | None = None, *, labels: Iterable[str] | None = None
+    eaf: str | PathLike[str],
+    signer: str | None = None,
+    *,
+    tier: str = "affect",
+    vocabulary: Vocabulary | None = None,
 ) -> Segments:
     """Read the reference annotation of one signer.
 
@@ -35,17 +40,22 @@ def read_reference(
     eaf : path
         An EAF, format 2.5 to 3.0.
     signer : str, optional
-        Whose tier: `affect@SIGNER`, else `affect`, else the lab's tier that signface wrote the signer's affect to.
-        When not given, `affect` or the only such tier.
-    labels : iterable of str, optional
-        The labels allowed; by default `N A D F J Sa Su` and their transitions.
+        Whose tier: `TIER@SIGNER`, else `TIER`, else the lab's tier that signface wrote the signer's affect to. When
+        not given, `TIER` or the only such tier.
+    tier : str
+        What was annotated: the name of a tier, or its part before `@`.
+    vocabulary : Vocabulary, optional
+        The labels allowed. By default those of affect (`signface.label.vocabulary.AFFECT`) on a tier of affect, those
+        of its closed vocabulary on another tier, and what it holds where it has none.
 
     Returns
     -------
     Segments
         `start_s, end_s, kind, label`; `intensity` (1, 2, 3 or missing) where a tier `intensity@SIGNER` exists.
         Annotations without a value are left out. Missing time values, which ELAN allows within a chain of
-        annotations, are spread evenly between the known ones. A lab's values are turned back into labels.
+        annotations, are spread evenly between the known ones. A lab's values are turned back into labels. Where the
+        vocabulary has no transitions, every annotation is a stable segment, and two of one label that touch are one
+        segment; the history says how many there were.
 
     Raises
     ------
@@ -71,18 +81,58 @@ def read_reference(
     """
     file = Path(eaf)
     root = read_document(file).getroot()
-    name = _affect_tier_name(root, signer, file)
+    name = _tier_name(root, tier, signer, file)
     _fill_times(root)
     tiers = tier_rows(root)
-    allowed = set(AFFECT.values if labels is None else labels)
-    rows = _checked_rows(tiers[name], name, channel_labels(root).get(name, ("", {}))[1], allowed, file)
-    stable = set(AFFECTS) if labels is None else {label for label in allowed if not _is_transition(label, allowed)}
+    meaning = channel_labels(root).get(name, ("", {}))[1]
+    if vocabulary is None:
+        vocabulary = AFFECT if tier == "affect" else _vocabulary_of(root, name, tiers[name], file)
+    rows = _checked_rows(tiers[name], name, meaning, vocabulary, file)
+    history = [f"read_reference {file.name} {name}"]
+    if not vocabulary.transitions and (merged := _merged(rows)) != rows:
+        history.append(f"merged {len(rows)} annotations into {len(merged)}: equal ones touched")
+        rows = merged
     table = _table(rows)
-    table.insert(2, "kind", ["stable" if label in stable else "transition" for label in table["label"]])
+    moving = [vocabulary.is_transition(label) for label in table["label"]]
+    table.insert(2, "kind", np.where(np.array(moving, dtype=bool), "transition", "stable").astype(object))
     intensity_name = "intensity" + name.removeprefix("affect")
-    if intensity_name in tiers:
+    if tier == "affect" and intensity_name in tiers:
         table["intensity"] = _intensities(rows, tiers[intensity_name], intensity_name, file)
-    return Segments(table, name=file.stem, history=(f"read_reference {file.name} {name}",))
+    return Segments(table, name=file.stem, history=tuple(history))
+
+
+def reference_vocabulary(files: Sequence[tuple[str | PathLike[str], str | None]], tier: str) -> Vocabulary:
+    """The vocabulary that the references of a corpus share on a tier.
+
+    That of the tier's linguistic type, if all files have the same; else one of all values that are annotated.
+
+    Parameters
+    ----------
+    files : sequence of (path, str or None)
+        Each annotation, and its signer.
+    tier : str
+
+    Raises
+    ------
+    SignfaceError
+        As `read_reference`, or nothing is annotated.
+    """
+    if tier == "affect":
+        return AFFECT
+    closed: list[Vocabulary] = []
+    labels: set[str] = set()
+    for eaf, signer in files:
+        file = Path(eaf)
+        root = read_document(file).getroot()
+        name = _tier_name(root, tier, signer, file)
+        vocabulary = vocabulary_of_tier(root, name, file)
+        closed += [] if vocabulary is None else [vocabulary]
+        labels |= {value.strip() for _, _, value in tier_rows(root)[name]} - {""}
+    if len(closed) == len(files) and len({(one.values, one.transitions) for one in closed}) == 1:
+        return max(closed, key=lambda one: len(one.colours))  # not every file has its colours beside it
+    if not labels:
+        raise SignfaceError(f"nothing is annotated on the tier {tier}")
+    return Vocabulary(tier.partition("@")[0], tuple(sorted(labels)))
 
 
 def read_tiers(eaf: str | PathLike[str]) -> dict[str, pd.DataFrame]:
@@ -129,8 +179,10 @@ def read_annotators(files: Sequence[str | PathLike[str]]) -> dict[str, dict[str,
     return {name: read_tiers(file) for name, file in zip(names, files, strict=True)}
 
 
-def read_corrections(eaf: str | PathLike[str], signer: str | None = None) -> tuple[pd.DataFrame, pd.DataFrame] | None:
-    """The affect tier as signface wrote it and as it is now: two tables `start_s, end_s, label`.
+def read_corrections(
+    eaf: str | PathLike[str], signer: str | None = None, *, tier: str = "affect", vocabulary: Vocabulary | None = None
+) -> tuple[pd.DataFrame, pd.DataFrame] | None:
+    """A tier as signface wrote it and as it is now: two tables `start_s, end_s, label`.
 
     None when signface did not write the tier, so that nothing can be said of corrections.
 
@@ -141,13 +193,13 @@ def read_corrections(eaf: str | PathLike[str], signer: str | None = None) -> tup
     """
     file = Path(eaf)
     root = read_document(file).getroot()
-    name = _affect_tier_name(root, signer, file)
+    name = _tier_name(root, tier, signer, file)
     written = recorded(root).get(name)
     if written is None:
         return None
     meaning = channel_labels(root).get(name, ("", {}))[1]
     before = _table([(start, end, meaning.get(value, value)) for start, end, value in written])
-    after = read_reference(file, signer).table[["start_s", "end_s", "label"]]
+    after = read_reference(file, signer, tier=tier, vocabulary=vocabulary).table[["start_s", "end_s", "label"]]
     return before, after
 
 
@@ -175,10 +227,11 @@ def _table(rows: Iterable[Row]) -> pd.DataFrame:
 
 
 def _checked_rows(
-    annotations: list[Row], name: str, meaning: dict[str, str], allowed: set[str], file: Path
+    annotations: list[Row], name: str, meaning: dict[str, str], vocabulary: Vocabulary, file: Path
 ) -> list[tuple[int, int, str]]:
     """The annotations with a value, as labels; each with a time, in the vocabulary, none overlapping another."""
     rows: list[tuple[int, int, str]] = []
+    allowed = set(vocabulary.allowed)
     for start, end, value in annotations:
         label = meaning.get(value, value.strip())
         if not label:
@@ -189,7 +242,8 @@ def _checked_rows(
             raise SignfaceError(
                 f"label {label!r} on tier {name} at {start / 1000:.3f} s is not in the vocabulary",
                 file=file,
-                hint=f"stable labels are {', '.join(AFFECTS)}; transitions join two of them, as NA",
+                hint=f"stable labels are {', '.join(vocabulary.values)}"
+                + ("; transitions join two of them, as NA" if vocabulary is AFFECT else ""),
             )
         if rows and start < rows[-1][1]:
             raise SignfaceError(f"annotations on tier {name} overlap at {start / 1000:.3f} s", file=file)
@@ -197,32 +251,48 @@ def _checked_rows(
     return rows
 
 
-def _is_transition(label: str, labels: set[str]) -> bool:
-    """Whether a label joins two others of the set."""
-    return any(label[:cut] in labels and label[cut:] in labels for cut in range(1, len(label)))
+def _merged(rows: list[tuple[int, int, str]]) -> list[tuple[int, int, str]]:
+    """The rows with those of one label made one that follow each other without a gap."""
+    merged = rows[:1]
+    for start, end, label in rows[1:]:
+        if label == merged[-1][2] and start - merged[-1][1] <= 1:  # whole milliseconds may lie between
+            merged[-1] = (merged[-1][0], end, label)
+        else:
+            merged.append((start, end, label))
+    return merged
 
 
-def _affect_tier_name(root: etree._Element, signer: str | None, file: Path) -> str:
+def _vocabulary_of(root: etree._Element, name: str, rows: list[Row], file: Path) -> Vocabulary:
+    """The closed vocabulary of a tier, or one of what it holds."""
+    closed = vocabulary_of_tier(root, name, file)
+    labels = sorted({value.strip() for _, _, value in rows} - {""})
+    if closed is None and not labels:
+        raise SignfaceError(f"nothing is annotated on the tier {name}", file=file)
+    return closed or Vocabulary(name.partition("@")[0], tuple(labels))
+
+
+def _tier_name(root: etree._Element, wanted: str, signer: str | None, file: Path) -> str:
+    """The tier of a channel, of a signer where one is named."""
     tiers = {tier.get("TIER_ID") or "": tier for tier in root.iterfind("TIER")}
-    labs = [name for name, (channel, _) in channel_labels(root).items() if channel == "affect" and name in tiers]
-    affect = [name for name in tiers if name == "affect" or name.startswith("affect@")]
+    labs = [name for name, (channel, _) in channel_labels(root).items() if channel == wanted and name in tiers]
+    ours = [name for name in tiers if name == wanted or name.startswith(f"{wanted}@")]
     there = f"its tiers are {', '.join(list(tiers)[:12]) or 'none'}"
     if signer:
-        theirs = [name for name in labs if tiers[name].get("PARTICIPANT") == clean_name(signer)]
-        for wanted in (tier_name("affect", signer), "affect"):
-            if wanted in affect:
-                return wanted
-        if len(theirs) == 1 or len(labs) == 1:
-            return (theirs or labs)[0]
-        raise SignfaceError(f"no tier affect@{signer} or affect", file=file, hint=there)
-    if "affect" in affect:
-        return "affect"
-    candidates = affect or labs
+        of_signer = [name for name in labs if tiers[name].get("PARTICIPANT") == clean_name(signer)]
+        for name in (tier_name(wanted, signer), wanted):
+            if name in ours:
+                return name
+        if len(of_signer) == 1 or len(labs) == 1:
+            return (of_signer or labs)[0]
+        raise SignfaceError(f"no tier {wanted}@{signer} or {wanted}", file=file, hint=there)
+    if wanted in ours:
+        return wanted
+    candidates = ours or labs
     if len(candidates) == 1:
         return candidates[0]
     if candidates:
-        raise SignfaceError(f"has several affect tiers: {', '.join(candidates)}", file=file, hint="name the signer")
-    raise SignfaceError("no tier affect or affect@SIGNER", file=file, hint=there)
+        raise SignfaceError(f"has several {wanted} tiers: {', '.join(candidates)}", file=file, hint="name the signer")
+    raise SignfaceError(f"no tier {wanted} or {wanted}@SIGNER", file=file, hint=there)
 
 
 def _fill_times(root: etree._Element) -> None:

@@ -2,7 +2,7 @@
 
 - `Tier`: a time-aligned tier and the tiers that depend on it by symbolic association.
 - `milliseconds`: seconds to the whole milliseconds of EAF, without gaps, overlaps or empty annotations appearing.
-- `affect_tier`: the tiers `affect@SIGNER`, `affect-confidence@SIGNER` and `intensity@SIGNER` from labelled segments.
+- `label_tier`: the tiers `affect@SIGNER`, `affect-confidence@SIGNER` and `intensity@SIGNER` from labelled segments.
 - `doubtful_tier`: the segments whose confidence is low, on a tier of their own.
 """
 
@@ -15,8 +15,8 @@ import numpy as np
 import pandas as pd
 
 from signface.content import Content
-from signface.elan.vocabularies import AFFECT, INTENSITY, Vocabulary
 from signface.errors import SignfaceError
+from signface.label.vocabulary import AFFECT, INTENSITY, Vocabulary
 from signface.segmentation.segments import Segments
 
 
@@ -108,8 +108,10 @@ def milliseconds(start_s: np.ndarray, end_s: np.ndarray) -> tuple[np.ndarray, np
     return starts, ends
 
 
-def affect_tier(segments: Segments, signer: str = "", *, vocabulary: Vocabulary = AFFECT) -> Tier:
-    """The tier `affect@SIGNER` and what depends on it.
+def label_tier(
+    segments: Segments, signer: str = "", *, channel: str = "affect", vocabulary: Vocabulary = AFFECT
+) -> Tier:
+    """The tier `CHANNEL@SIGNER` and what depends on it.
 
     Segments that end before time 0 (a take that began before its video) are left out and one that contains it is
     cut there: EAF has no negative times.
@@ -117,35 +119,44 @@ def affect_tier(segments: Segments, signer: str = "", *, vocabulary: Vocabulary 
     Parameters
     ----------
     segments : Segments
-        With `label`; a `confidence` column (0 to 1) gives `affect-confidence@SIGNER`, an `intensity` column (1, 2
+        With `label`; a `confidence` column (0 to 1) gives `CHANNEL-confidence@SIGNER`, an `intensity` column (1, 2
         or 3, missing where not annotated) gives `intensity@SIGNER`.
     signer : str
         Empty for a tier without `@`.
+    channel : str
+        What was labelled.
     vocabulary : Vocabulary
-        The labels allowed.
+        The labels allowed. Its blank, where it has one, is not written.
 
     Raises
     ------
     SignfaceError
         The segments carry no label, or one outside the vocabulary.
     """
-    table, start_ms, end_ms = _after_time_0(segments)
+    table, start_ms, end_ms = _after_time_0(segments, vocabulary)
     dependents = []
     if "confidence" in table.columns:
         numbers = table["confidence"].to_numpy(float)
         texts = tuple(f"{number:.2f}" if np.isfinite(number) else None for number in numbers)
-        dependents.append(DependentTier("affect-confidence", texts))
+        dependents.append(DependentTier(f"{channel}-confidence", texts))
     if "intensity" in table.columns:
         numbers = table["intensity"].to_numpy(float)
         texts = tuple(f"{number:g}" if np.isfinite(number) else None for number in numbers)
         INTENSITY.check([value for value in texts if value is not None], f"{segments.name}: intensity")
         dependents.append(DependentTier("intensity", texts, INTENSITY))
     labels = tuple(str(label) for label in table["label"])
-    return Tier("affect", signer, start_ms, end_ms, labels, vocabulary, tuple(dependents))
+    return Tier(channel, signer, start_ms, end_ms, labels, vocabulary, tuple(dependents))
 
 
-def doubtful_tier(segments: Segments, signer: str = "", *, below: float = 0.5, vocabulary: Vocabulary = AFFECT) -> Tier:
-    """The tier `affect-doubtful@SIGNER`: the segments whose confidence is low, for an annotator to go through first.
+def doubtful_tier(
+    segments: Segments,
+    signer: str = "",
+    *,
+    below: float = 0.5,
+    channel: str = "affect",
+    vocabulary: Vocabulary = AFFECT,
+) -> Tier:
+    """The tier `CHANNEL-doubtful@SIGNER`: the segments whose confidence is low, for an annotator to go through first.
 
     Parameters
     ----------
@@ -154,26 +165,29 @@ def doubtful_tier(segments: Segments, signer: str = "", *, below: float = 0.5, v
     signer : str
     below : float
         Segments with a confidence under it are taken.
+    channel : str
     vocabulary : Vocabulary
 
     Raises
     ------
     SignfaceError
-        As `affect_tier`, or the segments carry no confidence.
+        As `label_tier`, or the segments carry no confidence.
     """
-    table, start_ms, end_ms = _after_time_0(segments)
+    table, start_ms, end_ms = _after_time_0(segments, vocabulary)
     if "confidence" not in table.columns:
         raise SignfaceError(f"{segments.name}: the segments carry no confidence", hint="label them first")
     low = table["confidence"].to_numpy(float) < below
     labels = tuple(str(label) for label in table["label"][low])
-    return Tier("affect-doubtful", signer, start_ms[low], end_ms[low], labels, vocabulary)
+    return Tier(f"{channel}-doubtful", signer, start_ms[low], end_ms[low], labels, vocabulary)
 
 
-def _after_time_0(segments: Segments) -> tuple[pd.DataFrame, np.ndarray, np.ndarray]:
-    """The labelled rows that lie after time 0, and their times in milliseconds."""
+def _after_time_0(segments: Segments, vocabulary: Vocabulary) -> tuple[pd.DataFrame, np.ndarray, np.ndarray]:
+    """The labelled rows that lie after time 0 and are written, and their times in milliseconds."""
     if not segments.labelled:
         raise SignfaceError(f"{segments.name}: the segments carry no labels", hint="label them first")
     table = segments.table[segments.table["end_s"] > 0.0005]
+    if vocabulary.blank:
+        table = table[table["label"] != vocabulary.blank]
     start_ms, end_ms = milliseconds(table["start_s"].clip(lower=0).to_numpy(float), table["end_s"].to_numpy(float))
     return table, start_ms, end_ms
 

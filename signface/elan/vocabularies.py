@@ -1,98 +1,201 @@
-"""Controlled vocabularies: the values that a tier may hold, with their descriptions and colours.
+"""Vocabularies read from what laboratories have: EAFs and their templates, shared `.ecv` files, text files.
 
-- `Vocabulary`, `Entry`: what ELAN calls a controlled vocabulary and its entries.
-- `AFFECT`: the seven stable expressions and the 42 transitions between them (thesis 4.3.2).
-- `INTENSITY`: 1, 2 or 3.
+- `read_vocabulary`: a `Vocabulary` from any of them.
+- `write_vocabulary`: a text file of one, to be changed by hand.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import permutations
+import re
+from collections.abc import Iterable, Iterator
+from os import PathLike
+from pathlib import Path
 
+from lxml import etree
+
+from signface.elan.document import parse_xml, read_document
 from signface.errors import SignfaceError
-from signface.label.vocabulary import AFFECTS, COLOURS, join
+from signface.files import whole_file
+from signface.label.vocabulary import Colour, Entry, Vocabulary
+
+#: Endings of what is read as XML; anything else is text.
+XML_ENDINGS = (".eaf", ".etf", ".ecv")
 
 
-@dataclass(frozen=True)
-class Entry:
-    """One value of a controlled vocabulary.
+def read_vocabulary(path: str | PathLike[str], *, tier: str | None = None, name: str | None = None) -> Vocabulary:
+    """Read a vocabulary.
 
-    Parameters
-    ----------
-    value : str
-        What stands in the annotation.
-    description : str
-        What ELAN shows beside it.
-    colour : (3,) tuple of int, optional
-        Red, green, blue, 0 to 255.
-    """
+    - `.eaf`, `.etf`: the closed vocabulary of a tier, of a name, or the only one; its colours are those of the
+      preferences (`.pfsx`) beside the file.
+    - `.ecv`: the same of ELAN's external vocabularies.
+    - Any other ending: text, one value a line; after tabs its description and its colour as `#rrggbb`, both optional.
+      Empty lines are passed over, and what stands after a `#` at the beginning of a line describes the vocabulary.
 
-    value: str
-    description: str = ""
-    colour: tuple[int, int, int] | None = None
-
-    @property
-    def identifier(self) -> str:
-        """The entry's `CVE_ID`; it depends on the value only, so that two runs write the same file."""
-        return "cveid_" + "".join(c if c.isascii() and c.isalnum() else f"_{ord(c):x}_" for c in self.value)
-
-
-@dataclass(frozen=True)
-class Vocabulary:
-    """A closed controlled vocabulary.
+    Values that are two others joined are transitions where all of them are there.
 
     Parameters
     ----------
-    name : str
-        The `CV_ID`; linguistic types refer to it.
-    description : str
-    entries : tuple of Entry
+    path : path
+    tier : str, optional
+        Name of a tier whose vocabulary is wanted.
+    name : str, optional
+        Of the vocabulary.
+
+    Raises
+    ------
+    SignfaceError
+        The file is missing, is none of these, has no such tier or vocabulary, or several; or the tier has none.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> file = Path(mkdtemp()) / "brows.txt"
+    >>> _ = file.write_text("raised\\teyebrows raised\\nlowered\\n")
+    >>> read_vocabulary(file).values
+    ('raised', 'lowered')
     """
+    file = Path(path)
+    try:
+        if file.suffix.lower() not in XML_ENDINGS:
+            return _from_text(file)
+        if file.suffix.lower() == ".ecv":
+            root = parse_xml(file).getroot()
+        else:
+            root = read_document(file).getroot()
+        element = _chosen(root, tier, name, file)
+        language = next((t.get("LANG_REF") for t in root.iterfind("TIER") if t.get("TIER_ID") == tier), None)
+        return _from_element(element, language, file)
+    except SignfaceError as error:
+        raise error.at(file) from error
 
-    name: str
-    description: str
-    entries: tuple[Entry, ...]
 
-    @property
-    def values(self) -> tuple[str, ...]:
-        """The values, in order."""
-        return tuple(entry.value for entry in self.entries)
+def write_vocabulary(vocabulary: Vocabulary, path: str | PathLike[str]) -> None:
+    """Write a vocabulary as text, which `read_vocabulary` reads; the file's name is the vocabulary's.
 
-    def check(self, values: list[str], where: str) -> None:
-        """Refuse values that are not in the vocabulary.
+    Raises
+    ------
+    SignfaceError
+        A value or description does not fit on a line, or the ending is one of ELAN's.
+    """
+    file = Path(path)
+    if file.suffix.lower() in XML_ENDINGS:
+        raise SignfaceError("vocabularies are written as text (.txt)", file=file)
+    lines = [f"# {vocabulary.description}"] if vocabulary.description else []
+    for entry in vocabulary.entries:
+        cells = [entry.value, entry.description, "" if entry.colour is None else "#" + bytes(entry.colour).hex()]
+        if entry.value.startswith("#") or any(cell != " ".join(cell.split()) for cell in cells):
+            raise SignfaceError(f"{entry.value!r} and its description do not fit on a line of text", file=file)
+        lines.append("\t".join(cells).rstrip("\t"))
+    with whole_file(file) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", "utf-8")
 
-        Raises
-        ------
-        SignfaceError
-            Names the values and where they were found.
-        """
-        outside = sorted(set(values) - set(self.values))
-        if outside:
-            listed = ", ".join(repr(value) for value in outside[:5])
+
+def vocabulary_of_tier(root: etree._Element, tier: str, file: Path) -> Vocabulary | None:
+    """The closed vocabulary of a tier of an EAF; None where it has none, or one that is kept elsewhere."""
+    wanted = _name_of(root, tier)
+    for element in root.iterfind("CONTROLLED_VOCABULARY"):
+        if element.get("CV_ID") == wanted and len(list(_values(element, None))):
+            language = next((t.get("LANG_REF") for t in root.iterfind("TIER") if t.get("TIER_ID") == tier), None)
+            return _from_element(element, language, file)
+    return None
+
+
+def _from_text(file: Path) -> Vocabulary:
+    try:
+        lines = file.read_text("utf-8-sig").splitlines()
+    except FileNotFoundError as error:
+        raise SignfaceError("no such file", file=file) from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise SignfaceError("cannot be read as text", file=file) from error
+    entries, said = [], []
+    for number, line in enumerate(lines, start=1):
+        if not line.strip():
+            continue
+        if line.startswith("#"):
+            said.append(line[1:].strip())
+            continue
+        value, description, colour, *more = [*(cell.strip() for cell in line.split("\t")), "", ""]
+        if not value or any(more) or not re.fullmatch("(#[0-9a-fA-F]{6})?", colour):
             raise SignfaceError(
-                f"{where}: {listed} not in the closed vocabulary {self.name}",
-                hint=f"it holds {', '.join(self.values[:12])}{' ...' if len(self.values) > 12 else ''}",
+                f"line {number} is no value with a description and a colour: {line!r}",
+                file=file,
+                hint="write VALUE, a tab, DESCRIPTION, a tab, #rrggbb",
             )
+        red_green_blue = tuple(bytes.fromhex(colour[1:]))
+        entries.append(Entry(value, description, red_green_blue if colour else None))  # type: ignore[arg-type]
+    values = [entry.value for entry in entries]
+    twice = next((value for value in values if values.count(value) > 1), None)
+    if twice is not None or not values:
+        raise SignfaceError("holds no value" if twice is None else f"has {twice!r} twice", file=file)
+    return Vocabulary.of(entries, file.stem, " ".join(said))
 
 
-def _affect() -> Vocabulary:
-    stable = [Entry(label, name, COLOURS[label]) for label, name in AFFECTS.items()]
-    transitions = []
-    for before, after in permutations(AFFECTS, 2):
-        # Half way between the two, and paler, so that the stable segments stand out on the tier.
-        red, green, blue = ((a + b + 2 * 255) // 4 for a, b in zip(COLOURS[before], COLOURS[after]))
-        description = f"transition from {AFFECTS[before]} to {AFFECTS[after]}"
-        transitions.append(Entry(join(before, after), description, (red, green, blue)))
-    return Vocabulary(
-        "affect", "Expression held or the transition between two, seven classes of affect", (*stable, *transitions)
-    )
+def _chosen(root: etree._Element, tier: str | None, name: str | None, file: Path) -> etree._Element:
+    """The vocabulary's element: that of the tier, of the name, or the only one."""
+    elements = {element.get("CV_ID") or "": element for element in root.iterfind("CONTROLLED_VOCABULARY")}
+    there = f"its vocabularies are {', '.join(elements)}" if elements else "it has no vocabulary"
+    if tier is not None and root.tag != "CV_RESOURCE":
+        tiers = [element.get("TIER_ID") or "" for element in root.iterfind("TIER")]
+        if tier not in tiers:
+            raise SignfaceError(f"has no tier {tier}", file=file, hint=f"its tiers are {', '.join(tiers) or 'none'}")
+        name = _name_of(root, tier)
+        if name is None:
+            raise SignfaceError(f"its tier {tier} has no closed vocabulary", file=file, hint=there)
+    if name is None and len(elements) != 1:
+        raise SignfaceError("has several vocabularies" if elements else "has no vocabulary", file=file, hint=there)
+    element = elements.get(name) if name is not None else next(iter(elements.values()))
+    if element is None:
+        raise SignfaceError(f"has no vocabulary {name}", file=file, hint=there)
+    return element
 
 
-#: Stable labels, then transitions named by joining two of them.
-AFFECT = _affect()
-INTENSITY = Vocabulary(
-    "intensity",
-    "Intensity of the affect",
-    (Entry("1", "slight"), Entry("2", "marked"), Entry("3", "extreme")),
-)
+def _name_of(root: etree._Element, tier: str) -> str | None:
+    """Name of the vocabulary of a tier's linguistic type."""
+    kind = next((t.get("LINGUISTIC_TYPE_REF") for t in root.iterfind("TIER") if t.get("TIER_ID") == tier), None)
+    types = {element.get("LINGUISTIC_TYPE_ID"): element for element in root.iterfind("LINGUISTIC_TYPE")}
+    return types[kind].get("CONTROLLED_VOCABULARY_REF") if kind in types else None
+
+
+def _values(element: etree._Element, language: str | None) -> Iterator[tuple[str, str, str]]:
+    """Value, description and identifier of each entry, in a language where the entry has it."""
+    for entry in element.iterfind("CV_ENTRY_ML"):
+        values = entry.findall("CVE_VALUE")
+        chosen = next((value for value in values if value.get("LANG_REF") == language), values[0] if values else None)
+        if chosen is not None:
+            yield (chosen.text or "").strip(), chosen.get("DESCRIPTION") or "", entry.get("CVE_ID") or ""
+    for entry in element.iterfind("CV_ENTRY"):  # EAF 2.7 and before
+        yield (entry.text or "").strip(), entry.get("DESCRIPTION") or "", ""
+
+
+def _from_element(element: etree._Element, language: str | None, file: Path) -> Vocabulary:
+    name = element.get("CV_ID") or file.stem
+    if element.get("EXT_REF"):
+        raise SignfaceError(f"the vocabulary {name} is kept in another file", file=file, hint="read its .ecv")
+    colours = _colours(file.with_suffix(".pfsx"), name)
+    rows = {value: (description, key) for value, description, key in _values(element, language) if value}
+    if not rows:
+        raise SignfaceError(f"the vocabulary {name} has no value", file=file)
+    described = element.find("DESCRIPTION")
+    description = (described.text or "") if described is not None else element.get("DESCRIPTION") or ""
+    entries = [Entry(value, words, colours.get(key)) for value, (words, key) in rows.items()]
+    return Vocabulary.of(entries, name, description)
+
+
+def _colours(preferences: Path, name: str) -> dict[str, Colour]:
+    """Colour of each entry of a vocabulary in the preferences beside an EAF; none where they cannot be read."""
+    if not preferences.is_file():
+        return {}
+    try:
+        root = parse_xml(preferences).getroot()
+    except SignfaceError:  # an annotator's preferences are not what was asked for
+        return {}
+    groups: Iterable[etree._Element] = root.iterfind("prefGroup[@key='CV.ML.Prefs']/prefGroup")
+    colours: dict[str, Colour] = {}
+    for group in groups:
+        for entry in group.iterfind("prefGroup") if group.get("key") == name else ():
+            found = re.fullmatch(r"(\d{1,3}),(\d{1,3}),(\d{1,3})", (entry.findtext("pref/Object") or "").strip())
+            if found is not None and all(int(part) < 256 for part in found.groups()):
+                red, green, blue = map(int, found.groups())
+                colours[entry.get("key") or ""] = (red, green, blue)
+    return colours

@@ -45,10 +45,10 @@ from signface.elan.elements import CONSTRAINTS, add_link, add_media
 from signface.elan.mapping import read_mapping
 from signface.elan.merging import put_tiers
 from signface.elan.preferences import write_preferences
-from signface.elan.tiers import Tier, affect_tier, doubtful_tier, xml_text
+from signface.elan.tiers import Tier, doubtful_tier, label_tier, xml_text
 from signface.elan.upgrade import upgrade
-from signface.elan.vocabularies import AFFECT, Vocabulary
 from signface.errors import SignfaceError
+from signface.label.vocabulary import AFFECT, Vocabulary
 from signface.segmentation.segments import Segments
 from signface.settings.eaf import EafOptions
 from signface.signer import Signer
@@ -84,6 +84,16 @@ class Results(Protocol):
         ...
 
     @property
+    def tier(self) -> str:
+        """What the segments are of."""
+        ...
+
+    @property
+    def vocabulary(self) -> Vocabulary:
+        """Of their labels."""
+        ...
+
+    @property
     def facts(self) -> MappingABC[str, str]:
         """What the header of the file says of the results."""
         ...
@@ -97,7 +107,8 @@ def write_eaf(
     options: EafOptions | None = None,
     signer: str | None = None,
     video: str | PathLike[str] | None = None,
-    vocabulary: Vocabulary = AFFECT,
+    tier: str | None = None,
+    vocabulary: Vocabulary | None = None,
     properties: MappingABC[str, str] | None = None,
     date: datetime.datetime | str | None = None,
     replace: bool = False,
@@ -127,8 +138,11 @@ def write_eaf(
         `@`.
     video : path or URL, optional
         The media file that the annotations belong to.
-    vocabulary : Vocabulary
-        The labels allowed on the affect tier.
+    tier : str, optional
+        What the segments are of: the part of the tier's name before `@`. The annotation's own when not given, and
+        `affect` for segments alone.
+    vocabulary : Vocabulary, optional
+        The labels allowed on that tier; the annotation's own when not given, and those of affect for segments alone.
     properties : mapping, optional
         What the header says besides the tool, its version and the annotation's facts. Each is written as
         `signface:NAME`.
@@ -174,6 +188,7 @@ def write_eaf(
         options=options,
         signer=signer,
         video=video,
+        tier=tier,
         vocabulary=vocabulary,
         properties=properties,
         date=date,
@@ -189,7 +204,8 @@ def prepare(
     options: EafOptions | None = None,
     signer: str | None = None,
     video: str | PathLike[str] | None = None,
-    vocabulary: Vocabulary = AFFECT,
+    tier: str | None = None,
+    vocabulary: Vocabulary | None = None,
     properties: MappingABC[str, str] | None = None,
     date: datetime.datetime | str | None = None,
     replace: bool = False,
@@ -210,14 +226,17 @@ def prepare(
     curves, tiers, facts = None, [], dict(properties or {})
     if isinstance(annotation, Segments):
         segments, signer = annotation, signer or ""
+        tier, vocabulary = tier or "affect", vocabulary or AFFECT
     else:
+        tier, vocabulary = tier or annotation.tier, vocabulary or annotation.vocabulary
         segments, signer = annotation.segments, annotation.signer.name if signer is None else signer
         curves = annotation.curves if options.curves else None
         facts = {**annotation.facts, **facts}
-        tiers = channel_tiers((annotation.channels or {}).values(), signer)
+        others = (event for event in (annotation.channels or {}).values() if event.channel != tier)
+        tiers = channel_tiers(others, signer)
     if options.doubtful is not None:
-        tiers = [doubtful_tier(segments, signer, below=options.doubtful, vocabulary=vocabulary), *tiers]
-    all_tiers = (affect_tier(segments, signer, vocabulary=vocabulary), *tiers)
+        tiers = [doubtful_tier(segments, signer, below=options.doubtful, channel=tier, vocabulary=vocabulary), *tiers]
+    all_tiers = (label_tier(segments, signer, channel=tier, vocabulary=vocabulary), *tiers)
     rules = {} if options.mapping is None else read_mapping(options.mapping)
     links = () if curves is None else _curve_files(root, file)
     source = file if into is not None or options.template is None else Path(options.template)

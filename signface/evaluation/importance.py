@@ -15,7 +15,6 @@ import pandas as pd
 
 from signface.label.model import TrainedModel
 from signface.label.spans import segment_means
-from signface.label.vocabulary import AFFECTS
 from signface.metrics.classification import accuracy_interval
 from signface.signer import signer_level
 
@@ -110,12 +109,13 @@ def permutation_importance(
     if not truths:
         return pd.DataFrame(columns=["group", "bases", "accuracy_lost", "low", "high"])
     truth, take = np.concatenate(truths), np.concatenate(takes)
+    labels = folds[0].test[0].vocabulary.values
     rows = []
     for group, parts in lost.items():
         own = np.concatenate(parts)
         low, high = accuracy_interval(own.tolist(), take.tolist(), seed=seed) or (np.nan, np.nan)
         row = {"group": group, "bases": bases[group], "accuracy_lost": own.mean(), "low": low, "high": high}
-        rows.append(row | {f"lost_{label}": own[truth == label].mean() for label in AFFECTS if label in truth})
+        rows.append(row | {f"lost_{label}": own[truth == label].mean() for label in labels if label in truth})
     return pd.DataFrame(rows).sort_values("accuracy_lost", ascending=False, kind="stable", ignore_index=True)
 
 

@@ -23,8 +23,8 @@ from signface.label.calibration import brier_score, expected_calibration_error
 from signface.label.intensity import IntensityClassifier
 from signface.label.labelling import find_segments, label_segments, label_spans
 from signface.label.model import TrainedModel
-from signface.label.vocabulary import AFFECTS
-from signface.learn.examples import Example, signer_levels
+from signface.label.vocabulary import Vocabulary
+from signface.learn.examples import Example, common_vocabulary, signer_levels
 from signface.learn.folds import groups_of, inner_folds
 from signface.learn.ordinal import ordinal_metrics
 from signface.learn.training import train_model
@@ -255,9 +255,10 @@ def evaluate(
         for name, sections in tables.items()
     }
     test = [example for fold in folds for example in fold.test]
+    vocabulary = common_vocabulary(test)
     metrics: dict = {
         "segmentation": segmentation_metrics((e.reference.table, known[e.take].table) for e in test),
-        "classifiers": {name: _scores(sections, settings.seed) for name, sections in pooled.items()},
+        "classifiers": {name: _scores(sections, vocabulary, settings.seed) for name, sections in pooled.items()},
     }
     metrics["segmentation_by_classifier"] = {name: segmentation_metrics(pairs) for name, pairs in own.items() if pairs}
     if strengths:
@@ -265,7 +266,9 @@ def evaluate(
     metrics["mcnemar"] = _mcnemar({name: sections["manual_segments"] for name, sections in pooled.items()})
     by_signer = {
         signer: {
-            name: _scores({key: table[table.signer == signer] for key, table in sections.items()}, settings.seed)
+            name: _scores(
+                {key: table[table.signer == signer] for key, table in sections.items()}, vocabulary, settings.seed
+            )
             for name, sections in pooled.items()
         }
         for signer in dict.fromkeys(fold.signer for fold in folds)
@@ -294,7 +297,7 @@ def score_model(model: TrainedModel, test: Sequence[Example], *, seed: int = 0) 
             parts.setdefault(section, []).append(table.assign(take=f"{example.signer}/{example.take}"))
         if model.intensity is not None:
             strengths.append(_intensities(example, model.intensity))
-    scores = _scores({section: pd.concat(tables) for section, tables in parts.items()}, seed)
+    scores = _scores({section: pd.concat(tables) for section, tables in parts.items()}, common_vocabulary(test), seed)
     scores["segmentation"] = segmentation_metrics(pairs)
     if strengths:
         scores["intensity"] = _intensity_scores(pd.concat(strengths, ignore_index=True))
@@ -375,13 +378,15 @@ def _annotation_at(table: pd.DataFrame, times: np.ndarray) -> np.ndarray:
     return np.where(kinds == TRANSITION, TRANSITION, labels)
 
 
-def _scores(sections: dict[str, pd.DataFrame], seed: int) -> dict:
+def _scores(sections: dict[str, pd.DataFrame], vocabulary: Vocabulary, seed: int) -> dict:
     """The metrics of one classifier, section by section."""
     scores = {}
     for section, table in sections.items():
         judged = table[table["truth"] != ""]
         # Labels found where nothing was: an automatic annotation has no gaps, so this does not happen to frames.
-        labels = [*AFFECTS, TRANSITION] if section == "frames" else list(AFFECTS)
+        labels = list(vocabulary.values)
+        if section == "frames" and vocabulary.transitions:
+            labels.append(TRANSITION)
         result = classification_metrics(judged["truth"].tolist(), judged["found"].tolist(), labels)
         hits = (judged["truth"] == judged["found"]).tolist()
         result["accuracy_interval"] = accuracy_interval(hits, judged["take"].tolist(), seed=seed)

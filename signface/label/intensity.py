@@ -12,14 +12,11 @@ import pandas as pd
 
 from signface.descriptors import Descriptors
 from signface.label.spans import segment_means
-from signface.label.vocabulary import AFFECTS
+from signface.label.vocabulary import AFFECT
 from signface.segmentation.segments import Segments
 
 #: The intensities there are.
 INTENSITIES = (1, 2, 3)
-
-#: The labels that have an intensity.
-EXPRESSED = tuple(label for label in AFFECTS if label != "N")
 
 
 class IntensityClassifier:
@@ -37,18 +34,21 @@ class IntensityClassifier:
         Slope over the strength, and offset, of the log odds of lying above each level but the last. Plain numbers, so
         that a saved model is read without scikit-learn.
     n_segments_ : int
+    rest_ : str
+        The label that has no intensity.
     """
 
     bases_: tuple[str, ...]
     levels_: np.ndarray
     lines_: np.ndarray
     n_segments_: int
+    rest_: str = AFFECT.rest
 
     def predict(self, take: Descriptors, spans: np.ndarray, labels: Sequence[str]) -> list[int | None]:
-        """Intensity of each (S, 2) span of a take with its label; None for neutral and where nothing was seen."""
+        """Intensity of each (S, 2) span of a take with its label; None at rest and where nothing was seen."""
         table = pd.DataFrame({"start_s": spans[:, 0], "end_s": spans[:, 1], "label": list(labels)})
         strength = self.strength(take, table)
-        judged = np.isfinite(strength) & table["label"].isin(EXPRESSED).to_numpy()
+        judged = np.isfinite(strength) & (table["label"] != self.rest_).to_numpy()
         levels: list[int | None] = [None] * len(table)
         if judged.any():
             odds = strength[judged, None] * self.lines_[:, 0] + self.lines_[:, 1]
@@ -58,7 +58,7 @@ class IntensityClassifier:
         return levels
 
     def annotate(self, take: Descriptors, segments: Segments) -> Segments:
-        """Labelled segments with a column `intensity`, missing for transitions and neutral."""
+        """Labelled segments with a column `intensity`, missing for transitions and faces at rest."""
         table = segments.table.copy()
         stable = (table["kind"] == "stable").to_numpy()
         levels: list[int | None] = [None] * len(table)

@@ -2,12 +2,14 @@
 
 - `label_spans`: a label and a confidence for any stretches of a take, each for itself.
 - `label_segments`: the segments of a take with labels, transitions included.
+- `without_transitions`: a labelled table in which one value ends where the next begins.
 - `find_segments`: a take's segments and their labels by whatever the model is, from nothing but the take.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,7 +19,7 @@ from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.label.model import TrainedModel
 from signface.label.spans import frames_within, segment_means
-from signface.label.vocabulary import join
+from signface.label.vocabulary import Vocabulary
 from signface.segmentation.cutting import segment
 from signface.segmentation.segments import Segments
 from signface.signer import SignerLevel
@@ -73,13 +75,13 @@ def _judged_by_rows(take: Descriptors, spans: np.ndarray, model: TrainedModel) -
     offset = 0
     for row, frames in enumerate(thinned):
         if known[row]:
-            own = probabilities[offset : offset + len(frames)]
-            shares[row], logs[row] = own.mean(axis=0), np.log(own.clip(LEAST)).mean(axis=0)
+            of_span = probabilities[offset : offset + len(frames)]
+            shares[row], logs[row] = of_span.mean(axis=0), np.log(of_span.clip(LEAST)).mean(axis=0)
         offset += len(frames)
     chosen = logs.argmax(axis=1)
     if model.card.aggregate == "mean":
-        said = model.estimator.predict(means[known])
-        chosen[known] = [model.card.labels.index(label) for label in said]
+        labels = model.estimator.predict(means[known])
+        chosen[known] = [model.card.labels.index(label) for label in labels]
     nearest = np.flatnonzero(known)
     for blind in np.flatnonzero(~known):  # the expression before goes on, or at the start the one after was there
         before = nearest[nearest < blind]
@@ -160,7 +162,7 @@ def label_segments(
         replace(state, label=label, confidence=confidence)
         for state, label, confidence in zip(states, labels, confidences, strict=True)
     ]
-    table = _table(_without_repetition(states))
+    table = _table(_without_repetition(states), model.card.vocabulary)
     labelled = segments.changed(f"label {model.name} ({model.card.classifier})", table)
     return labelled if model.intensity is None else model.intensity.annotate(descriptors, labelled)
 
@@ -186,6 +188,8 @@ def find_segments(descriptors: Descriptors, model: TrainedModel, *, level: Signe
     for row in np.flatnonzero(~stable):  # as sure as both neighbours
         sure[row] = np.prod([sure[other] for other in (row - 1, row + 1) if 0 <= other < len(sure) and stable[other]])
     table["confidence"] = sure
+    if not model.card.vocabulary.transitions:
+        table = without_transitions(table)
     labelled = found.changed(f"find_segments {model.name} ({model.card.classifier})", table)
     return labelled if model.intensity is None else model.intensity.annotate(descriptors, labelled)
 
@@ -243,14 +247,33 @@ def _without_repetition(states: list[_State]) -> list[_State]:
     return kept
 
 
-def _table(states: list[_State]) -> pd.DataFrame:
-    """The rows of the states and of the transitions between them."""
+def without_transitions(table: pd.DataFrame) -> pd.DataFrame:
+    """A labelled table in which every transition is shared by its neighbours, half and half.
+
+    That is how tiers are annotated whose vocabulary has no transitions: one value ends where the next begins. At the
+    ends of the take the one neighbour takes all.
+    """
+    stable = (table["kind"] == "stable").to_numpy()
+    if stable.all() or not stable.any():
+        return table[stable].reset_index(drop=True)
+    start, end = table["start_s"].to_numpy(float).copy(), table["end_s"].to_numpy(float).copy()
+    rows = np.flatnonzero(stable)
+    start[rows[0]], end[rows[-1]] = start[0], end[-1]
+    for before, after in pairwise(rows):
+        if after > before + 1:
+            end[before] = start[after] = (end[before] + start[after]) / 2
+    return table.assign(start_s=start, end_s=end)[stable].reset_index(drop=True)
+
+
+def _table(states: list[_State], vocabulary: Vocabulary) -> pd.DataFrame:
+    """The rows of the states, and of the transitions between them where the vocabulary has any."""
     rows: list[tuple[float, float, str, str, float]] = []
     for number, state in enumerate(states):
         if state.moving and number > 0:
             before = states[number - 1]
-            name = join(before.label, state.label)
+            name = vocabulary.join(before.label, state.label) if vocabulary.transitions else ""
             rows.append((before.end, state.start, "transition", name, before.confidence * state.confidence))
         if state.end > state.start:
             rows.append((state.start, state.end, "stable", state.label, state.confidence))
-    return pd.DataFrame(rows, columns=["start_s", "end_s", "kind", "label", "confidence"])
+    table = pd.DataFrame(rows, columns=["start_s", "end_s", "kind", "label", "confidence"])
+    return table if vocabulary.transitions else without_transitions(table)

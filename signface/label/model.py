@@ -13,6 +13,7 @@ from signface.descriptors import Descriptors
 from signface.errors import SignfaceError, SignfaceWarning
 from signface.label.calibration import calibrated
 from signface.label.variants import DescriptorVariant
+from signface.label.vocabulary import AFFECT, Vocabulary
 from signface.settings.choices import SEQUENCE_NAMES
 from signface.signer import SignerLevel
 
@@ -57,6 +58,10 @@ class Card:
         is not calibrated.
     version : str
         Version of signface that trained it.
+    vocabulary : Vocabulary
+        What the labels stand for, and which of them there could be.
+    tier : str
+        The tier that it was trained on.
     training, solve : mapping
         Settings it was trained with, and its takes were solved with, as plain values
         (`signface.settings.training.TrainingSettings`, `signface.settings.solve.SolveSettings`); empty in the cards of
@@ -84,6 +89,8 @@ class Card:
     version: str = ""
     training: Mapping[str, Any] = field(default_factory=dict)
     solve: Mapping[str, Any] = field(default_factory=dict)
+    vocabulary: Vocabulary = AFFECT
+    tier: str = "affect"
 
 
 @dataclass(frozen=True)

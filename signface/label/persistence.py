@@ -24,6 +24,7 @@ from signface.label.model import Card, TrainedModel
 from signface.label.plain_archive import is_plain, plain_entries, read_plain
 from signface.label.skops_archive import read_skops, skops_entries
 from signface.label.variants import DescriptorVariant
+from signface.label.vocabulary import Vocabulary
 from signface.settings.choices import SEQUENCE_NAMES
 
 CARD = "signface.json"
@@ -181,6 +182,8 @@ def _card(content: dict[str, Any]) -> Card:
         for name, value in content.items()
         if name in known
     }
+    if "vocabulary" in values:
+        values["vocabulary"] = Vocabulary.from_dict(values["vocabulary"])
     card = Card(**values)
     if not (isinstance(card.bases, tuple) and isinstance(card.labels, tuple) and isinstance(card.scores, dict)):
         raise ValueError("the card's lists are no lists")

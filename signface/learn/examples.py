@@ -3,6 +3,7 @@
 - `Example`: a solved take with its reference annotation.
 - `training_frames`: the frames of one that a classifier learns from.
 - `frame_table`: those of many, with the take and the signer of each, for scikit-learn.
+- `common_bases`, `common_vocabulary`: what they must share.
 - `in_order`: takes in an order that does not depend on the corpus's.
 - `signer_levels`: what each signer's weights are normalised by.
 """
@@ -11,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -19,12 +21,18 @@ import pandas as pd
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.label.variants import DescriptorVariant
-from signface.label.vocabulary import AFFECTS
+from signface.label.vocabulary import AFFECT, Vocabulary
 from signface.segmentation.segments import Segments
 from signface.signer import SignerLevel, signer_level
 
 #: Frames per second kept for training: a held face hardly changes in a tenth of a second.
 TRAINING_RATE = 10.0
+
+#: How long a transition lasts where annotators mark its moment only (s).
+TRANSITION_S = 0.16
+
+#: Segments nearer to each other than this touch (s): EAF holds whole milliseconds.
+TOUCHING_S = 0.0015
 
 
 class FrameTable(NamedTuple):
@@ -61,6 +69,10 @@ class Example:
         With the column `label`: labels of stable segments, names of transitions; perhaps `intensity` (1, 2 or 3).
     sentence : str, optional
         What is signed, where the corpus names it: takes of one sentence are alike.
+    vocabulary : Vocabulary
+        Of the reference's labels.
+    tier : str
+        What was annotated: `affect`, or the tier's name without its signer.
 
     See Also
     --------
@@ -82,21 +94,30 @@ class Example:
     descriptors: Descriptors
     reference: Segments
     sentence: str | None = None
+    vocabulary: Vocabulary = AFFECT
+    tier: str = "affect"
 
     def __post_init__(self) -> None:
         if not self.reference.labelled:
             raise SignfaceError(f"{self.take}: its reference annotation has no labels")
-        unknown = sorted({str(label) for label in self.stable["label"]} - set(AFFECTS))
+        unknown = sorted({str(label) for label in self.stable["label"]} - set(self.vocabulary.values))
         if unknown:
             raise SignfaceError(
                 f"{self.take}: its reference annotation has the unknown label {', '.join(unknown)}",
-                hint=f"the labels of stable segments are {' '.join(AFFECTS)}",
+                hint=f"the labels of stable segments are {' '.join(self.vocabulary.values)}",
             )
 
     @property
     def stable(self) -> pd.DataFrame:
         """The rows of the reference's stable segments."""
         return self.reference.table[self.reference.table["kind"] == "stable"]
+
+    @property
+    def moving(self) -> Segments:
+        """The reference with a transition wherever one label follows another, as sequence models learn it."""
+        if self.vocabulary.transitions:
+            return self.reference
+        return self.reference.changed("with_transitions", _with_transitions(self.reference.table))
 
 
 def training_frames(
@@ -165,6 +186,25 @@ def common_bases(examples: Sequence[Example]) -> tuple[str, ...]:
     return first.descriptors.names
 
 
+def common_vocabulary(examples: Sequence[Example]) -> Vocabulary:
+    """The vocabulary of the examples.
+
+    Raises
+    ------
+    SignfaceError
+        Two takes were annotated with different ones, or on different tiers.
+    """
+    first = examples[0]
+    for other in examples[1:]:
+        if (other.vocabulary, other.tier) != (first.vocabulary, first.tier):
+            raise SignfaceError(
+                f"the takes {first.take} and {other.take} are annotated with other vocabularies "
+                f"({first.vocabulary.name} on {first.tier}, {other.vocabulary.name} on {other.tier})",
+                hint="train on takes of one tier, and name its vocabulary",
+            )
+    return first.vocabulary
+
+
 def in_order(examples: Sequence[Example]) -> list[Example]:
     """The takes by signer, kind and name, so that a training does not depend on their order."""
     return sorted(examples, key=lambda example: (example.signer, example.kind, example.take))
@@ -224,3 +264,18 @@ def frame_table(
         np.repeat(np.array([e.take for e in examples], dtype=str), counts),
         np.repeat(np.array([e.signer for e in examples], dtype=str), counts),
     )
+
+
+def _with_transitions(table: pd.DataFrame) -> pd.DataFrame:
+    """A labelled table with a short transition in the middle of which each boundary between two labels lies."""
+    columns = ["start_s", "end_s", "kind", "label"]
+    rows = [list(row) for row in table[columns].itertuples(index=False)]
+    result = rows[:1]
+    for before, after in pairwise(rows):
+        boundary = after[0]
+        if boundary - before[1] < TOUCHING_S and before[3] != after[3]:
+            reach = min(TRANSITION_S / 2, (before[1] - before[0]) / 3, (after[1] - boundary) / 3)
+            before[1], after[0] = boundary - reach, boundary + reach
+            result.append([boundary - reach, boundary + reach, "transition", f"{before[3]}{after[3]}"])
+        result.append(after)
+    return pd.DataFrame(result, columns=columns)

@@ -15,8 +15,7 @@ from signface.errors import SignfaceError
 from signface.label.labellers import SEQUENCE_NAMES, make_labeller
 from signface.label.model import Card, TrainedModel
 from signface.label.variants import DescriptorVariant
-from signface.label.vocabulary import AFFECTS
-from signface.learn.examples import Example, common_bases, frame_table, signer_levels
+from signface.learn.examples import Example, common_bases, common_vocabulary, frame_table, signer_levels
 from signface.settings.training import TrainingSettings
 
 
@@ -36,7 +35,7 @@ def fit_model(examples: Sequence[Example], settings: TrainingSettings, *, name: 
     SignfaceError
         There is no training frame, only one label, a take has other bases, or the classifier has no such parameter.
     """
-    bases = common_bases(examples)
+    bases, vocabulary = common_bases(examples), common_vocabulary(examples)
     fit = _fit_sequence if settings.classifier in SEQUENCE_NAMES else _fit_frames
     labeller, frames = fit(examples, settings, bases)
     card = Card(
@@ -55,6 +54,8 @@ def fit_model(examples: Sequence[Example], settings: TrainingSettings, *, name: 
         parameters=dict(settings.parameters),
         version=version("signface"),
         training=settings.as_dict(),
+        vocabulary=vocabulary,
+        tier=examples[0].tier,
     )
     return TrainedModel(labeller, card, name=name)
 
@@ -67,16 +68,17 @@ def _fit_frames(examples: Sequence[Example], settings: TrainingSettings, bases: 
     frames, labels, *_ = frame_table(
         examples, features=settings.features, normalise=settings.normalise, rate=settings.rate
     )
-    shown = [label for label in AFFECTS if label in set(labels)]
+    vocabulary = examples[0].vocabulary
+    shown = [label for label in vocabulary.values if label in set(labels)]
     if len(shown) < 2:
         raise SignfaceError(
-            f"the training takes show {len(shown)} expression{'s' * (len(shown) != 1)}, a classifier needs two or more",
+            f"the training takes show {len(shown)} label{'s' * (len(shown) != 1)}, a classifier needs two or more",
             hint="train on more takes, or look at their annotations",
         )
     rarest = min(shown, key=lambda label: int((labels == label).sum()))
     if (labels == rarest).sum() < 3:
         raise SignfaceError(
-            f"the training takes hold less than half a second of {AFFECTS[rarest]} ({rarest})",
+            f"the training takes hold less than half a second of {vocabulary.spelt(rarest)}",
             hint="train on more takes of it, or on takes without it",
         )
     if settings.balanced and settings.classifier.startswith("knn"):
@@ -109,5 +111,5 @@ def _fit_sequence(examples: Sequence[Example], settings: TrainingSettings, bases
     levels = signer_levels(examples) if settings.normalise == "signer" else {}
     variant = DescriptorVariant(normalise=settings.normalise)
     takes = [variant.of(e.descriptors.on(bases), levels.get(e.signer)) for e in examples]
-    labeller.fit(takes, [e.reference for e in examples])
+    labeller.fit(takes, [e.moving for e in examples])
     return labeller, labeller.n_frames_

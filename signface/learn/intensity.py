@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from signface.label.intensity import EXPRESSED, IntensityClassifier
+from signface.label.intensity import IntensityClassifier
 from signface.learn.examples import Example, common_bases
 from signface.learn.ordinal import OrdinalClassifier
 from signface.segmentation.segments import Segments
@@ -31,10 +31,10 @@ def train_intensity(examples: Sequence[Example]) -> IntensityClassifier | None:
     None where there is too little to learn from: fewer than `LEAST_SEGMENTS` segments with an intensity, or fewer than
     `LEAST_EACH` of a second intensity.
     """
-    known = [e for e in examples if len(_with_intensity(e.reference))]
+    known = [e for e in examples if len(_with_intensity(e.reference, e.vocabulary.rest))]
     if not known:
         return None
-    counts = pd.concat([_with_intensity(e.reference)["intensity"] for e in known]).value_counts()
+    counts = pd.concat([_with_intensity(e.reference, e.vocabulary.rest)["intensity"] for e in known]).value_counts()
     if counts.sum() < LEAST_SEGMENTS or len(counts) < 2 or counts.iloc[1] < LEAST_EACH:
         return None
     return _fitted(known, common_bases(known))
@@ -48,8 +48,10 @@ def _fitted(examples: Sequence[Example], bases: tuple[str, ...]) -> IntensityCla
     rows, levels = [], []
     model = IntensityClassifier()
     model.bases_ = bases
+    if examples[0].vocabulary.rest != model.rest_:
+        model.rest_ = examples[0].vocabulary.rest
     for example in examples:
-        table = _with_intensity(example.reference)
+        table = _with_intensity(example.reference, model.rest_)
         strength = model.strength(example.descriptors, table)
         seen = np.isfinite(strength)
         rows.append(strength[seen, None])
@@ -62,12 +64,12 @@ def _fitted(examples: Sequence[Example], bases: tuple[str, ...]) -> IntensityCla
     return model
 
 
-def _with_intensity(reference: Segments) -> pd.DataFrame:
+def _with_intensity(reference: Segments, rest: str) -> pd.DataFrame:
     """The stable segments of a reference that have an intensity."""
     table = reference.table
     if "intensity" not in table or "label" not in table:
         return pd.DataFrame(columns=["start_s", "end_s", "label", "intensity"])
-    kept = (table["kind"] == "stable") & table["intensity"].notna() & table["label"].isin(EXPRESSED)
+    kept = (table["kind"] == "stable") & table["intensity"].notna() & (table["label"] != rest)
     return table.loc[kept, ["start_s", "end_s", "label", "intensity"]]
 
 

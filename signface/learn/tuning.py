@@ -122,5 +122,5 @@ def _sequence_scores(pairs: Folds, grid: Sequence[Mapping[str, Any]], settings: 
         estimator: Any = model.estimator
         for number, parameters in enumerate(grid):
             estimator.set_params(**parameters)
-            totals[number] += len(left_out) * estimator.score(takes, [e.reference for e in left_out])
+            totals[number] += len(left_out) * estimator.score(takes, [e.moving for e in left_out])
     return (totals / sum(len(left_out) for _, left_out in pairs)).tolist()

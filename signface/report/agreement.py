@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from signface.files import whole_file
+from signface.label.vocabulary import Vocabulary
 from signface.metrics.tiers import TierAgreement
 from signface.report.colours import colour_of, ink_on
 from signface.report.timeline import save_figure
@@ -79,12 +80,16 @@ def draw_agreement(annotators: Mapping[str, pd.DataFrame], seconds: pd.DataFrame
     figure = Figure(figsize=(10, height + size), layout="constrained")
     upper, lower = figure.subplots(2, 1, height_ratios=[height, size])
     span = max((float(table["end_s"].max()) for table in annotators.values() if len(table)), default=1.0)
+    vocabulary = Vocabulary.holding(label for table in annotators.values() for label in table["label"])
     for row, table in enumerate(annotators.values()):
         for start, end, label in table[["start_s", "end_s", "label"]].itertuples(index=False):
             width = end - start
-            upper.barh(row, width, left=start, height=0.7, color=colour_of(label), edgecolor="white", linewidth=0.5)
+            upper.barh(
+                row, width, left=start, height=0.7, color=colour_of(label, vocabulary), edgecolor="white", linewidth=0.5
+            )
             if width > 0.012 * span * max(1, len(label)):  # only where the label has room
-                upper.text(start + width / 2, row, label, ha="center", va="center", fontsize=8, color=ink_on(label))
+                ink = ink_on(label, vocabulary)
+                upper.text(start + width / 2, row, label, ha="center", va="center", fontsize=8, color=ink)
     upper.set_yticks(range(len(annotators)), list(annotators))
     upper.invert_yaxis()
     upper.set_xlabel("time (s)")

@@ -8,7 +8,7 @@ import numpy as np
 
 from signface.descriptors import Descriptors
 from signface.face.model import FaceModel
-from signface.label.vocabulary import AFFECTS
+from signface.label.vocabulary import Vocabulary
 from signface.report.colours import colour_of
 from signface.report.timeline import draw_timeline_on
 from signface.segmentation.segments import Segments
@@ -25,6 +25,7 @@ def draw_overview(
     reference: Segments | None = None,
     title: str | None = None,
     moments: int = 3,
+    vocabulary: Vocabulary | None = None,
 ) -> Figure:
     """Draw the avatar, driven by the solved weights, in the middle of some stable segments, above the timeline.
 
@@ -41,6 +42,8 @@ def draw_overview(
         The name of the take by default.
     moments : int
         How many faces at most.
+    vocabulary : Vocabulary, optional
+        What the labels stand for; by default that of affect, or one of the labels at hand.
 
     Returns
     -------
@@ -51,18 +54,20 @@ def draw_overview(
 
     from signface.render.still import draw_face
 
+    if vocabulary is None:
+        vocabulary = Vocabulary.holding(segments.table["label"])
     frames = telling_frames(descriptors, segments, moments)
     figure = Figure(figsize=(10, 6.4), layout="constrained")
     faces, below = figure.subfigures(2, 1, squeeze=False, height_ratios=[1.05, 1])[:, 0]
-    draw_timeline_on(below, descriptors, segments, reference, title)
+    draw_timeline_on(below, descriptors, segments, reference, title, vocabulary)
     pictures = faces.subplots(1, max(1, len(frames)), squeeze=False)[0]
     for axes, (frame, label) in zip(pictures, frames, strict=False):
         axes.imshow(draw_face(face, descriptors.weights[frame], size=(440, 420)))
-        axes.set_xlabel(f"{descriptors.time[frame]:.2f} s: {AFFECTS.get(label, label)}", fontsize=10)
+        axes.set_xlabel(f"{descriptors.time[frame]:.2f} s: {vocabulary.describe(label)}", fontsize=10)
         axes.set_xticks([])
         axes.set_yticks([])
         for spine in axes.spines.values():
-            spine.set(color=colour_of(label), linewidth=3)
+            spine.set(color=colour_of(label, vocabulary), linewidth=3)
     for frame, _ in frames:
         below.axes[0].axvline(descriptors.time[frame], color="#303030", lw=0.8, ls=":", zorder=0)
     return figure

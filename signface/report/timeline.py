@@ -15,6 +15,7 @@ import numpy as np
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
+from signface.label.vocabulary import Vocabulary
 from signface.report.colours import colour_of, ink_on
 from signface.segmentation.segments import Segments
 
@@ -29,6 +30,7 @@ def draw_timeline(
     *,
     reference: Segments | None = None,
     title: str | None = None,
+    vocabulary: Vocabulary | None = None,
 ) -> Figure:
     """Draw the velocity and acceleration energies of a take above its segments.
 
@@ -42,6 +44,8 @@ def draw_timeline(
         An annotator's segments, drawn below the automatic ones.
     title : str, optional
         The name of the take by default.
+    vocabulary : Vocabulary, optional
+        Gives the labels their colours; by default that of affect, or one of the labels at hand.
 
     Returns
     -------
@@ -58,7 +62,7 @@ def draw_timeline(
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10, 3.1 if reference is None else 3.6), layout="constrained")
-    draw_timeline_on(figure, descriptors, segments, reference, title)
+    draw_timeline_on(figure, descriptors, segments, reference, title, vocabulary)
     return figure
 
 
@@ -68,10 +72,11 @@ def draw_timeline_on(
     segments: Segments,
     reference: Segments | None = None,
     title: str | None = None,
+    vocabulary: Vocabulary | None = None,
 ) -> None:
     """Draw the timeline on a figure, or on a part of one; see `draw_timeline`."""
     rows = {"automatic": segments} if reference is None else {"automatic": segments, "reference": reference}
-    draw_rows_on(figure, descriptors, rows, title=title)
+    draw_rows_on(figure, descriptors, rows, title=title, vocabulary=vocabulary)
 
 
 def draw_rows_on(
@@ -82,6 +87,7 @@ def draw_rows_on(
     title: str | None = None,
     rate: float | None = None,
     marks: Mapping[str, np.ndarray] | None = None,
+    vocabulary: Vocabulary | None = None,
 ) -> None:
     """Draw the energies of a take above any rows of segments, the first on top.
 
@@ -97,6 +103,8 @@ def draw_rows_on(
         Points of the curves per second, where that is fewer than the take has frames: for pages that hold many.
     marks : mapping of str to (K,) array, optional
         Row to times of boundaries that are pointed out on it (seconds).
+    vocabulary : Vocabulary, optional
+        As in `draw_timeline`.
     """
     from signface.segmentation.energy import energies
 
@@ -120,8 +128,12 @@ def draw_rows_on(
     above.set_title(descriptors.name if title is None else title, loc="left", fontsize=11)
     above.set_ylim(0, top)
     above.legend(loc="upper right", fontsize=8, frameon=False, ncols=2)
+    if vocabulary is None:
+        vocabulary = Vocabulary.holding(
+            label for segments in rows.values() if segments.labelled for label in segments.table["label"]
+        )
     for position, (name, segments) in enumerate(reversed(list(rows.items()))):
-        _draw_segments(below, segments, position)
+        _draw_segments(below, segments, position, vocabulary)
         times = (marks or {}).get(name, np.zeros(0))
         if len(times):
             below.plot(times, np.full(len(times), position + 0.4), "v", color="#c00000", ms=4.5, mec="white", mew=0.5)
@@ -134,24 +146,25 @@ def draw_rows_on(
     below.tick_params(axis="y", length=0)
 
 
-def _draw_segments(axes: Axes, segments: Segments, position: int) -> None:
+def _draw_segments(axes: Axes, segments: Segments, position: int, vocabulary: Vocabulary) -> None:
     """One row of coloured boxes; a label is written where its box is wide enough to hold it."""
     table = segments.table
     if not len(table):
         return
     span = table["end_s"].max() - table["start_s"].min()
     width = (table["end_s"] - table["start_s"]).to_numpy(float)
-    said = table["label"].astype(str) if "label" in table else table["kind"].map({"stable": "", "transition": "~"})
+    labels = table["label"].astype(str) if "label" in table else table["kind"].map({"stable": "", "transition": "~"})
     axes.broken_barh(
         list(zip(table["start_s"], width, strict=True)),
         (position - 0.4, 0.8),
-        facecolors=[colour_of(label) for label in said],
+        facecolors=[colour_of(label, vocabulary) for label in labels],
         edgecolor="#404040",
         lw=0.5,
     )
-    for start, own, label, kind in zip(table["start_s"], width, said, table["kind"], strict=True):
-        if kind == "stable" and own > 0.009 * span * max(1, len(label)):
-            axes.text(start + own / 2, position, label, ha="center", va="center", fontsize=8, color=ink_on(label))
+    for start, length, label, kind in zip(table["start_s"], width, labels, table["kind"], strict=True):
+        if kind == "stable" and length > 0.009 * span * max(1, len(label)):
+            ink = ink_on(label, vocabulary)
+            axes.text(start + length / 2, position, label, ha="center", va="center", fontsize=8, color=ink)
 
 
 def save_figure(figure: Figure, path: str | PathLike[str], *, dpi: int = 150) -> None:

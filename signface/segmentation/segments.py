@@ -19,6 +19,9 @@ from signface.files import whole_file
 
 KINDS = ("stable", "transition")
 
+#: Gaps between annotations shorter than this say nothing (s).
+LEAST_GAP_S = 0.04
+
 
 @dataclass(frozen=True, eq=False)
 class Segments(Content):
@@ -112,6 +115,18 @@ class Segments(Content):
         if cut.empty:
             raise SignfaceError(f"{self.name}: no segment lies between {start_s:g} and {end_s:g} s")
         return self.changed(f"between {start_s:g} and {end_s:g} s", cut)
+
+    def filled(self, start: float, end: float, label: str) -> Segments:
+        """Labelled segments with stable ones of `label` wherever there are none from `start` to `end` (seconds).
+
+        Gaps shorter than `LEAST_GAP_S` stay: they come from the hand on the mouse.
+        """
+        edges = [start, *self.table["end_s"]], [*self.table["start_s"], end]
+        gaps = [(a, b, "stable", label) for a, b in zip(*edges, strict=True) if b - a >= LEAST_GAP_S]
+        columns = ["start_s", "end_s", "kind", "label"]
+        parts = [self.table, pd.DataFrame(gaps, columns=columns)] if gaps else [self.table]
+        table = pd.concat(parts, ignore_index=True).sort_values("start_s", kind="stable", ignore_index=True)
+        return self.changed(f"filled with {label}", table)
 
     def changed(self, operation: str, table: pd.DataFrame) -> Segments:
         """A copy with another table and `operation` appended to the history."""

@@ -17,7 +17,6 @@ from sklearn.base import BaseEstimator
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.frames import runs
-from signface.label.vocabulary import join
 from signface.segmentation.segments import Segments
 from signface.sequence.boundary_features import boundary_features
 from signface.sequence.frame_features import TRANSITION, FrameFeatures, frame_states
@@ -116,7 +115,7 @@ class TakeLabeller(BaseEstimator, ABC):
         for number, (first, last, code, sure) in enumerate(kept):
             if number:
                 _, before, from_code, from_sure = kept[number - 1]
-                name = join(self.classes_[from_code], self.classes_[code])
+                name = f"{self.classes_[from_code]}{self.classes_[code]}"
                 rows.append((before, first, "transition", name, from_sure * sure))
             rows.append((first, last, "stable", str(self.classes_[code]), sure))
         table = pd.DataFrame(rows, columns=["start_s", "end_s", "kind", "label", "confidence"])

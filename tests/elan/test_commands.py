@@ -19,7 +19,7 @@ from signface.elan.document import read_document, tier_rows
 from signface.elan.mapping import ChannelRule, read_mapping
 from signface.elan.recogniser import extensions_folder, read_parameters, write_extension, write_tier_file
 from signface.elan.reference import read_corrections, read_reference
-from signface.elan.tiers import affect_tier
+from signface.elan.tiers import label_tier
 from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
 from signface.evaluation.corrections import changes, summarise_changes
@@ -297,7 +297,7 @@ def test_parameters_left_empty_are_not_given():
 
 @pytest.mark.parametrize("step", [0.5, 0.123, 0.0333, 7.777])
 def test_elans_short_numbers_lose_no_millisecond(tmp_path, step):
-    tier = affect_tier(labelled(" ".join(["N", "NJ", "J", "JN"] * 50), step=step), "S1")
+    tier = label_tier(labelled(" ".join(["N", "NJ", "J", "JN"] * 50), step=step), "S1")
     write_tier_file(tmp_path / "tiers.xml", tier)
     spans = etree.parse(tmp_path / "tiers.xml").getroot().findall("span")
     starts = [int(np.float32(1000) * np.float32(span.get("start"))) for span in spans]

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from signface.elan.reference import read_reference
 from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
+from signface.label.vocabulary import AFFECT
 from tests.fixtures.elan_files import labelled
 
 OLD = """<?xml version="1.0" encoding="UTF-8"?>
@@ -81,7 +82,7 @@ def test_a_label_outside_the_vocabulary_is_named_with_its_place(tmp_path):
     path = write_old(tmp_path / "old.eaf", second="happy")
     with pytest.raises(SignfaceError, match=r"'happy' on tier affect at 0\.400 s"):
         read_reference(path)
-    assert list(read_reference(path, labels=["N", "J", "happy"]).table["kind"]) == ["stable"] * 3
+    assert list(read_reference(path, vocabulary=AFFECT.including("happy")).table["kind"]) == ["stable"] * 3
 
 
 def test_annotations_without_a_value_are_left_out(tmp_path):

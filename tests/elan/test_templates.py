@@ -9,9 +9,9 @@ from lxml import etree
 from signface.elan.document import read_document, tier_rows
 from signface.elan.mapping import ChannelRule, read_mapping, suggest_mapping
 from signface.elan.tiers import Tier
-from signface.elan.vocabularies import AFFECT
 from signface.elan.writing import prepare, write_eaf
 from signface.errors import SignfaceError
+from signface.label.vocabulary import AFFECT
 from signface.settings.eaf import EafOptions
 from tests.fixtures.elan_files import assert_valid, labelled, mapped, read_back
 

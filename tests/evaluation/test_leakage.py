@@ -12,7 +12,7 @@ from sklearn.neighbors import KNeighborsClassifier
 
 from signface.descriptors import Descriptors
 from signface.evaluation.protocol import PROTOCOLS, evaluate, folds_of
-from signface.label.vocabulary import AFFECTS
+from signface.label.vocabulary import AFFECT
 from signface.learn.examples import Example, frame_table
 from signface.learn.folds import groups_of, inner_folds
 from signface.learn.training import train_model
@@ -124,7 +124,7 @@ def test_every_frame_of_a_table_knows_its_take_and_its_signer():
     X, y, takes, signers = frame_table(examples, features=("weights", "windows"))
     assert len(X) == len(y) == len(takes) == len(signers)
     assert X.shape[1] == 3 * len(BASES)
-    assert set(y) == set(AFFECTS)
+    assert set(y) == set(AFFECT.values)
     where = {e.take: e.signer for e in examples}
     assert [where[take] for take in takes] == signers.tolist()
     forest = RandomForestClassifier(10, random_state=0)
@@ -138,7 +138,7 @@ def test_normalising_a_signer_looks_at_no_label_and_no_other_signer():
     X, _, _, signers = frame_table(examples, normalise="signer")
     alone = frame_table([e for e in examples if e.signer == "S1"], normalise="signer").X
     np.testing.assert_array_equal(X[signers == "S1"], alone)
-    swapped = dict(zip(AFFECTS, [*list(AFFECTS)[1:], "N"], strict=True))
+    swapped = dict(zip(AFFECT.values, [*list(AFFECT.values)[1:], "N"], strict=True))
     turned = [
         dataclasses.replace(
             e,

@@ -13,7 +13,7 @@ from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.evaluation import protocol as protocol_module
 from signface.evaluation.protocol import PROTOCOLS, Fold, evaluate, folds_of, most_overlapping
-from signface.label.vocabulary import AFFECTS
+from signface.label.vocabulary import AFFECT
 from signface.learn.training import train_model
 from signface.settings.choices import NAMES
 from tests.fixtures.hand_made import BASES, corpus, example
@@ -66,7 +66,7 @@ def test_training_is_given_the_training_takes_and_nothing_else(examples, monkeyp
 
 def test_answers_do_not_depend_on_the_references_of_the_test_takes(examples):
     """Were a test reference seen in training, turning all of them round would change what is found."""
-    other = dict(zip(AFFECTS, [*list(AFFECTS)[1:], "N"], strict=True))
+    other = dict(zip(AFFECT.values, [*list(AFFECT.values)[1:], "N"], strict=True))
 
     def turned(e):
         table = e.reference.table.assign(label=[other.get(label, label) for label in e.reference.table.label])

@@ -14,7 +14,7 @@ from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.label.labelling import label_segments
 from signface.label.spans import segment_means
-from signface.label.vocabulary import AFFECTS, is_transition
+from signface.label.vocabulary import AFFECT
 from signface.learn.training import train_model
 from signface.segmentation.cutting import segment
 from signface.segmentation.segments import Segments
@@ -85,7 +85,7 @@ def test_a_take_that_is_all_movement_is_one_transition(model):
 @settings(deadline=None, max_examples=25)
 @given(
     seed=st.integers(0, 10_000),
-    labels=st.lists(st.sampled_from(list(AFFECTS)), min_size=1, max_size=6),
+    labels=st.lists(st.sampled_from(list(AFFECT.values)), min_size=1, max_size=6),
     cut=st.floats(0, 0.9),
 )
 def test_labelled_segments_cover_the_take_and_neighbours_differ(model, seed, labels, cut):
@@ -97,7 +97,7 @@ def test_labelled_segments_cover_the_take_and_neighbours_differ(model, seed, lab
     np.testing.assert_allclose(table.start_s[1:], table.end_s[:-1])
     assert table.confidence.between(0, 1).all()
     for kind, label in zip(table.kind, table.label, strict=True):
-        assert is_transition(label) if kind == "transition" else label in AFFECTS
+        assert AFFECT.is_transition(label) if kind == "transition" else label in AFFECT.values
     stable = table.label[table.kind == "stable"].tolist()
     assert all(one != other for one, other in pairwise(stable))
 

@@ -7,7 +7,7 @@ import json
 import subprocess
 import sys
 import zipfile
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ from signface.label.intensity import IntensityClassifier
 from signface.label.labelling import find_segments
 from signface.label.persistence import CARD, load_model, read_card, save_model
 from signface.label.skops_archive import RENAMED_ATTRIBUTES, RENAMED_MODULES, without_padding
-from signface.label.vocabulary import AFFECTS
+from signface.label.vocabulary import AFFECT
 from signface.learn.training import train_model
 from signface.settings.choices import NAMES
 from tests.fixtures.hand_made import corpus, example
@@ -57,7 +57,7 @@ TRAIN = """
 import sys
 from signface.label.persistence import save_model
 from signface.learn.training import train_model
-from signface.label.vocabulary import AFFECTS
+from signface.label.vocabulary import AFFECT
 from tests.fixtures.hand_made import corpus
 from tests.fixtures.training import quick
 takes = [e for e in corpus(("S1",)) if e.kind == "IE"]
@@ -141,6 +141,17 @@ def test_a_foreign_file_is_refused(content, tmp_path):
         load_model(file)
 
 
+def test_a_card_of_before_vocabularies_is_of_affect(saved, tmp_path):
+    today = read_card(saved)
+    card = {k: v for k, v in asdict(today).items() if k not in ("vocabulary", "tier", "training", "solve")}
+    file = tmp_path / "old.skops"
+    with zipfile.ZipFile(saved) as old, zipfile.ZipFile(file, "w") as new:
+        for name in old.namelist():
+            new.writestr(name, json.dumps(card) if name == CARD else old.read(name))
+    assert read_card(file) == load_model(file).card == replace(today, training={}, solve={})
+    assert (read_card(file).vocabulary, read_card(file).tier) == (AFFECT, "affect")
+
+
 def test_a_skops_file_of_another_tool_is_refused(takes, tmp_path):
     file = tmp_path / "other.skops"
     skops.io.dump(train_model(takes, quick("knn1")).estimator, file)
@@ -159,7 +170,7 @@ def test_a_file_with_untrusted_types_is_not_loaded(saved, tmp_path):
 
 def test_a_card_of_another_model_is_noticed(saved, takes, tmp_path):
     file = tmp_path / "swapped.skops"
-    card = json.loads(json.dumps(read_card(saved).__dict__))
+    card = asdict(read_card(saved))
     with zipfile.ZipFile(saved) as archive, zipfile.ZipFile(file, "w") as forged:
         for name in archive.namelist():
             content = json.dumps({**card, "labels": ["A", "B"]}).encode() if name == CARD else archive.read(name)
@@ -180,7 +191,7 @@ def test_the_shipped_classifier_fits_the_default_face_and_says_what_it_has_not_m
     file = shipped("classifiers", ".skops")["default"]
     card = load_model("default").card
     assert set(card.bases) == set(face.names)
-    assert card.labels == tuple(sorted(AFFECTS))
+    assert card.labels == tuple(sorted(AFFECT.values))
     assert file.stat().st_size < 3e6
     text = file.with_suffix(".md").read_text(encoding="utf-8")
     assert "It has met no real signer." in text
@@ -202,7 +213,7 @@ def as_before(model, file):
                     text = text.replace(json.dumps(today), json.dumps(former))
                 content = text.encode()
             old.writestr(name, content)
-        old.writestr(CARD, json.dumps(model.card.__dict__))
+        old.writestr(CARD, json.dumps(asdict(model.card)))
 
 
 @pytest.mark.parametrize("classifier", ["knn1", "crf", "net-hsmm"])
@@ -211,7 +222,7 @@ def test_a_file_of_an_older_version_answers_like_todays(classifier, tmp_path):
     intensity = IntensityClassifier()
     intensity.bases_, intensity.levels_ = tuple(takes[0].descriptors.names), np.array([1, 2, 3])
     intensity.lines_ = np.array([[2.0, -1.0], [2.0, -3.0]])
-    model = replace(train_model(takes, classifier=classifier), intensity=intensity)
+    model = replace(train_model(takes, quick(classifier)), intensity=intensity)
     as_before(model, tmp_path / "old.skops")
     save_model(model, tmp_path / "today.skops")
     old, today = load_model(tmp_path / "old.skops"), load_model(tmp_path / "today.skops")

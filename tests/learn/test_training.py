@@ -123,7 +123,7 @@ def test_the_card_says_what_the_model_was_trained_on(takes):
     assert card.labels == tuple(sorted(card.labels))
 
 
-@pytest.mark.parametrize(("labels", "problem"), [([], "no annotated take"), (["N"], "1 expression,")])
+@pytest.mark.parametrize(("labels", "problem"), [([], "no annotated take"), (["N"], "1 label,")])
 def test_too_little_to_train_on_is_said(labels, problem):
     with pytest.raises(SignfaceError, match=problem):
         train_model([example(labels)] if labels else [], quick())

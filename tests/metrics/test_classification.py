@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.metrics import confusion_matrix, f1_score
 
-from signface.label.vocabulary import AFFECTS
+from signface.label.vocabulary import AFFECT
 from signface.metrics.classification import accuracy_interval, classification_metrics, mcnemar
 
-LABELS = list(AFFECTS)
+LABELS = list(AFFECT.values)
 pairs = st.lists(st.tuples(st.sampled_from(LABELS), st.sampled_from(LABELS)), min_size=1, max_size=60)
 
 

@@ -15,7 +15,7 @@ from lxml import etree
 from signface.descriptors import Descriptors
 from signface.evaluation.measure import measure
 from signface.face.reading import read_face
-from signface.label.vocabulary import AFFECTS
+from signface.label.vocabulary import AFFECT
 from signface.report.evaluation.evaluated import Evaluated
 from signface.report.evaluation.importance import draw_importance, skin_values
 from signface.report.evaluation.report import draw_all, write_report
@@ -173,12 +173,12 @@ def test_the_same_evaluation_gives_the_same_bytes(both, folder, tmp_path):
 
 def test_the_headline_has_the_accuracies_and_what_they_are_held_against(both):
     best = both.metrics["classifiers"][both.best]
-    said = " ".join(headline(both.metrics, both.facts))
+    said = " ".join(headline(both.metrics, both.facts, both.vocabulary))
     for value in (best["automatic_segments"]["accuracy"], best["manual_segments"]["majority"]):
         assert f"{100 * value:.0f}\u202f%" in said
     assert "synthetic corpus" in said
     real = facts(both.examples, synthetic=False)
-    assert "synthetic" not in " ".join([*headline(both.metrics, real), *limits(both.metrics, real)])
+    assert "synthetic" not in " ".join([*headline(both.metrics, real, both.vocabulary), *limits(both.metrics, real)])
 
 
 def test_one_signer_and_a_take_in_which_nothing_is_found(tmp_path):
@@ -239,5 +239,5 @@ def test_how_it_was_trained_is_said_where_it_is_not_as_in_the_thesis():
 
 
 def test_labels_are_spelt_out(page):
-    for label, name in AFFECTS.items():
+    for label, name in AFFECT.descriptions.items():
         assert f"{label} {name}" in page

@@ -6,7 +6,7 @@ import pytest
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
-from signface.label.vocabulary import AFFECTS
+from signface.label.vocabulary import AFFECT
 from signface.report.colours import colour_of, ink_on
 from signface.report.timeline import draw_timeline, save_figure
 from signface.segmentation.segments import Segments
@@ -48,9 +48,9 @@ def test_another_ending_is_refused(take, segments, tmp_path):
 
 
 def test_colours_are_distinct_and_their_ink_is_legible():
-    colours = [colour_of(label) for label in AFFECTS]
-    assert len(set(colours)) == len(AFFECTS)
-    assert {ink_on(label) for label in AFFECTS} <= {"black", "white"}
+    colours = [colour_of(label) for label in AFFECT.values]
+    assert len(set(colours)) == len(AFFECT.values)
+    assert {ink_on(label) for label in AFFECT.values} <= {"black", "white"}
     assert ink_on("Su") == "black"  # on yellow
     assert ink_on("J") == "white"  # on dark blue
     assert colour_of("NA") == colour_of("SaSu") != colour_of("odd")

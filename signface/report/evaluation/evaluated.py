@@ -19,6 +19,7 @@ import pandas as pd
 
 from signface.evaluation.details import favourite
 from signface.face.model import FaceModel
+from signface.label.vocabulary import Vocabulary
 from signface.learn.examples import Example
 from signface.report.evaluation.tables import by_protocol
 from signface.report.evaluation.worst_takes import TakeVerdict, judge_take
@@ -64,6 +65,11 @@ class Evaluated:
         """Protocol to its part of metrics.json, the main one first."""
         return by_protocol(self.metrics)
 
+    @property
+    def vocabulary(self) -> Vocabulary:
+        """What the labels stand for."""
+        return self.examples[0].vocabulary
+
     @cached_property
     def best(self) -> str:
         """The classifier that is looked at closely."""
@@ -81,7 +87,14 @@ class Evaluated:
         usual = float(np.median(residuals)) if residuals else None
         judged = [
             judge_take(
-                e.reference, own[e.take], e.descriptors, take=e.take, signer=e.signer, kind=e.kind, usual_residual=usual
+                e.reference,
+                own[e.take],
+                e.descriptors,
+                take=e.take,
+                signer=e.signer,
+                kind=e.kind,
+                usual_residual=usual,
+                vocabulary=e.vocabulary,
             )
             for e in self.examples
             if e.take in own

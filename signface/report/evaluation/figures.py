@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from signface.descriptors import Descriptors
+from signface.label.vocabulary import Vocabulary
 from signface.report.evaluation.tables import PROTOCOL_TITLES, SECTIONS
 from signface.report.style import COLOURS, MARKS, styled
 from signface.report.timeline import draw_rows_on
@@ -224,7 +225,13 @@ def draw_learning_curve(table: pd.DataFrame) -> Figure:
         return figure
 
 
-def draw_take(descriptors: Descriptors, rows: Mapping[str, Segments], *, marks: Mapping[str, np.ndarray]) -> Figure:
+def draw_take(
+    descriptors: Descriptors,
+    rows: Mapping[str, Segments],
+    *,
+    marks: Mapping[str, np.ndarray],
+    vocabulary: Vocabulary | None = None,
+) -> Figure:
     """One take: its energies, what was found, and the reference below; boundaries without a counterpart are marked.
 
     Parameters
@@ -234,10 +241,12 @@ def draw_take(descriptors: Descriptors, rows: Mapping[str, Segments], *, marks: 
     rows : mapping of str to Segments
     marks : mapping of str to (K,) array
         Row to the times that are marked on it (seconds).
+    vocabulary : Vocabulary, optional
+        Gives the labels their colours.
     """
     with styled():
         figure = _figure(9.4, 2.0 + 0.28 * len(rows))
-        draw_rows_on(figure, descriptors, rows, title="", rate=CURVE_RATE, marks=marks)
+        draw_rows_on(figure, descriptors, rows, title="", rate=CURVE_RATE, marks=marks, vocabulary=vocabulary)
         return figure
 
 

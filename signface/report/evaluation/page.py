@@ -11,7 +11,6 @@ from typing import Any
 
 import pandas as pd
 
-from signface.label.vocabulary import AFFECTS
 from signface.report.evaluation import sections, words
 from signface.report.evaluation.evaluated import Drawn, Evaluated, figure_name, takes_table
 from signface.report.evaluation.worst_takes import FAR_S, TakeVerdict
@@ -49,7 +48,7 @@ def evaluation_page(evaluated: Evaluated, drawn: Mapping[str, Sequence[Drawn]]) 
         title=f"Evaluation on {facts['name']}",
         synthetic=facts["synthetic"],
         date=evaluated.date,
-        headline=words.headline(metrics, facts),
+        headline=words.headline(metrics, facts, evaluated.vocabulary),
         limits=words.limits(metrics, facts),
         done=[
             *(words.protocol_words(part["protocol"]) for part in evaluated.parts.values()),
@@ -57,7 +56,7 @@ def evaluation_page(evaluated: Evaluated, drawn: Mapping[str, Sequence[Drawn]]) 
         ],
         classifiers=words.classifier_words(metrics["classifiers"]),
         facts=_facts(evaluated),
-        labels=AFFECTS,
+        labels={value: evaluated.vocabulary.describe(value) for value in evaluated.vocabulary.values},
         sections=shown,
         best=evaluated.best,
         far=f"{FAR_S:.2f}",

@@ -198,7 +198,7 @@ def _take(evaluated: Evaluated, verdict: TakeVerdict) -> Drawn:
     rows["reference"] = example.reference
     return Drawn(
         figure_name(verdict.take),
-        figures.draw_take(example.descriptors, rows, marks=marks),
+        figures.draw_take(example.descriptors, rows, marks=marks, vocabulary=example.vocabulary),
         f"Timeline of {verdict.take}: energies above, the segments of {evaluated.best} and of the reference below. "
         + ("; ".join(verdict.reasons) or "Nothing is wrong."),
         "",

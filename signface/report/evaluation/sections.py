@@ -13,7 +13,6 @@ from typing import Any
 
 import pandas as pd
 
-from signface.label.vocabulary import AFFECTS
 from signface.report.evaluation import tables, words
 from signface.report.evaluation.evaluated import Evaluated
 from signface.report.pages import page_table, spelt
@@ -103,7 +102,7 @@ def _most_confused(evaluated: Evaluated) -> str:
     """The commonest mistake of the best classifier, in words."""
     scores = evaluated.metrics["classifiers"][evaluated.best]["automatic_segments"]
     mistakes = [
-        (count, AFFECTS[truth], AFFECTS[said])
+        (count, evaluated.vocabulary.describe(truth), evaluated.vocabulary.describe(said))
         for truth, row in zip(scores["labels"], scores["confusion"], strict=True)
         for said, count in zip(scores["labels"], row, strict=True)
         if truth != said and count

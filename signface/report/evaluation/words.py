@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from signface.evaluation.details import ENERGIES, favourite
-from signface.label.vocabulary import AFFECTS
+from signface.label.vocabulary import Vocabulary
 from signface.report.evaluation.tables import by_protocol
 from signface.settings.choices import NAMES, SEQUENCE_NAMES
 
@@ -86,7 +86,7 @@ def percent(value: float | None) -> str:
     return "–" if value is None else f"{100 * value:.0f}\u202f%"
 
 
-def headline(metrics: Mapping[str, Any], facts: Mapping[str, Any]) -> list[str]:
+def headline(metrics: Mapping[str, Any], facts: Mapping[str, Any], vocabulary: Vocabulary) -> list[str]:
     """The main result, beside what it is to be held against.
 
     Parameters
@@ -95,6 +95,8 @@ def headline(metrics: Mapping[str, Any], facts: Mapping[str, Any]) -> list[str]:
         The content of metrics.json.
     facts : mapping
         Of `signface.corpus.facts.corpus_facts`.
+    vocabulary : Vocabulary
+        What the labels stand for.
     """
     parts = by_protocol(metrics)
     first = next(iter(parts))
@@ -110,7 +112,7 @@ def headline(metrics: Mapping[str, Any], facts: Mapping[str, Any]) -> list[str]:
         f"{made} {percent(automatic['accuracy'])}{_interval(automatic)} of the segments found automatically as the "
         f"reference has them, and {percent(manual['accuracy'])}{_interval(manual)} of the annotator’s own segments, "
         + ("after training on the same signer. " if first == "within" else "for signers that it was not trained on. ")
-        + f"Always saying {AFFECTS.get(manual['majority_label'], 'one label')} would be right for "
+        + f"Always saying {vocabulary.describe(manual['majority_label'] or 'one label')} would be right for "
         f"{percent(manual['majority'])} of the annotator’s segments, a guess for {percent(manual['chance'])}."
     ]
     for protocol, part in parts.items():

@@ -14,7 +14,7 @@ import pandas as pd
 
 from signface.descriptors import Descriptors
 from signface.frames import runs
-from signface.label.vocabulary import AFFECTS
+from signface.label.vocabulary import AFFECT, Vocabulary
 from signface.metrics.segmentation import match_boundaries
 from signface.segmentation.segments import Segments, value_at
 
@@ -79,6 +79,7 @@ def judge_take(
     signer: str = "",
     kind: str = "",
     usual_residual: float | None = None,
+    vocabulary: Vocabulary = AFFECT,
 ) -> TakeVerdict:
     """Compare the annotation found with the reference and say what is wrong.
 
@@ -91,6 +92,8 @@ def judge_take(
     take, signer, kind : str
     usual_residual : float, optional
         Mean residual of the middle take of the corpus (mm), which this one's is held against.
+    vocabulary : Vocabulary
+        What the labels stand for.
 
     Examples
     --------
@@ -106,7 +109,11 @@ def judge_take(
     total = float(length.sum())
     right = float(length[parts["truth"] == parts["said"]].sum())
     missed, superfluous, shift = _boundaries(reference.table, found.table)
-    reasons = [*_confusions(parts), *missed.reasons("missed"), *superfluous.reasons("found where there is none")]
+    reasons = [
+        *_confusions(parts, vocabulary),
+        *missed.reasons("missed"),
+        *superfluous.reasons("found where there is none"),
+    ]
     held, there = (int((segments.table["kind"] == "stable").sum()) for segments in (reference, found))
     reasons += _count(held, there, missed.count, superfluous.count)
     if shift is not None:
@@ -189,21 +196,24 @@ def _runs(boundaries: np.ndarray, matched: Sequence[int]) -> _Lonely:
     return _Lonely(tuple(boundaries[start:end] for start, end in runs(lonely)), len(boundaries))
 
 
-def _confusions(parts: pd.DataFrame) -> list[tuple[float, str]]:
+def _confusions(parts: pd.DataFrame, vocabulary: Vocabulary) -> list[tuple[float, str]]:
     """`fear taken for surprise during 1.2 of its 3.0 s (at ...)`, weighed by the seconds."""
     parts = parts.assign(length=parts["end_s"] - parts["start_s"])
-    held = parts[parts["truth"].isin(list(AFFECTS))]
+    held = parts[parts["truth"].isin(vocabulary.values)]
     reasons = []
     for (truth, said), own in held[held["said"] != held["truth"]].groupby(["truth", "said"]):
         seconds = float(own["length"].sum())
-        if said not in AFFECTS or seconds < LEAST_S:  # what a transition takes of an expression is told as boundaries
+        if (
+            said not in vocabulary.values or seconds < LEAST_S
+        ):  # what a transition takes of an expression is told as boundaries
             continue
         whole = float(held.loc[held["truth"] == truth, "length"].sum())
         places = [place for place in _joined(own) if place[1] - place[0] >= LEAST_SHOWN_S]
         shown = sorted(sorted(places, key=lambda place: place[0] - place[1])[:PLACES])
         spelt = ", ".join(f"{start:.1f} to {end:.1f} s" for start, end in shown) or "in short stretches"
         more = ", and elsewhere" if len(places) > PLACES else ""
-        words = f"{AFFECTS[str(truth)]} taken for {AFFECTS[str(said)]} during {seconds:.1f} of its {whole:.1f} s"
+        shown_as, taken_for = vocabulary.describe(str(truth)), vocabulary.describe(str(said))
+        words = f"{shown_as} taken for {taken_for} during {seconds:.1f} of its {whole:.1f} s"
         reasons.append((seconds, f"{words} ({spelt}{more})"))
     return reasons
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from signface.errors import SignfaceError
 from signface.files import whole_file
-from signface.label.vocabulary import AFFECTS
+from signface.label.vocabulary import AFFECT
 from signface.report.pages import render_page
 from signface.report.study.figures import confusion_figure, differences_figure, expressions_figure, means_figure
 from signface.study.statistics.analysis import Analysis, Section
@@ -192,7 +192,7 @@ def _facts(analysis: Analysis) -> list[tuple[str, str, str]]:
 
 def _spelt(label: str) -> str:
     """An expression's label with what it stands for, where it is one of signface's own."""
-    return f"{label} {AFFECTS[label]}" if label in AFFECTS else label
+    return f"{label} {AFFECT.describe(label)}" if label in AFFECT.values else label
 
 
 def _section(section: Section, figures: list[dict[str, str]], analysis: Analysis) -> dict[str, Any]:

@@ -1,0 +1,130 @@
+"""A laboratory's own tier, from the annotator's files to the machine's: read, learnt, measured and written."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from signface.annotation import annotate
+from signface.cli.main import main
+from signface.corpus.examples import solve_examples
+from signface.corpus.manifest import read_corpus
+from signface.elan.document import read_document
+from signface.elan.reference import read_reference, read_tiers
+from signface.elan.vocabularies import read_vocabulary
+from signface.elan.writing import write_eaf
+from signface.errors import SignfaceError
+from signface.files import bundled_corpus
+from signface.label.labelling import without_transitions
+from signface.label.persistence import load_model, read_card
+from signface.label.vocabulary import Vocabulary
+from signface.learn.training import train_model
+from signface.segmentation.segments import Segments
+from tests.fixtures.elan_files import assert_valid
+from tests.fixtures.training import quick
+
+BROWS = Vocabulary("brows", ("up", "down"), {"up": "raised", "down": "lowered"}, {"up": (1, 2, 3), "down": (4, 5, 6)})
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The bundled corpus, with a tier of brows beside that of affect: anything shown is up, anger and disgust down."""
+    folder = tmp_path_factory.mktemp("lab") / "mini"
+    shutil.copytree(bundled_corpus(), folder, ignore=shutil.ignore_patterns("*.pfsx"))
+    for entry in read_corpus(folder):
+        table = without_transitions(read_reference(entry.annotation, entry.signer).table)
+        shown = table[table["label"] != "N"]
+        labels = np.where(shown["label"].isin(["A", "D"]), "down", "up")
+        segments = Segments(shown.assign(label=labels)[["start_s", "end_s", "kind", "label"]], name=entry.path.stem)
+        write_eaf(segments, into=entry.annotation, signer=entry.signer, tier="brows", vocabulary=BROWS)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def examples(folder):
+    return solve_examples(read_corpus(folder), tier="brows")
+
+
+def test_the_rest_of_the_take_is_none(examples):
+    for example in examples:
+        assert example.vocabulary == BROWS.with_blank("none")
+        assert example.tier == "brows"
+        table = example.reference.table
+        assert set(table["label"]) <= {"up", "down", "none"}
+        assert table["start_s"].iloc[0] == example.descriptors.start
+        assert table["end_s"].iloc[-1] == example.descriptors.start + example.descriptors.duration
+        np.testing.assert_allclose(table["start_s"][1:], table["end_s"][:-1], atol=1e-9)
+
+
+def test_the_rest_of_the_take_is_unknown_where_annotation_is_sparse(folder, examples):
+    for sparse, whole in zip(solve_examples(read_corpus(folder), tier="brows", sparse=True), examples, strict=True):
+        assert sparse.vocabulary == BROWS
+        shown = whole.reference.table.query("label != 'none'").reset_index(drop=True)
+        assert sparse.reference.table[list(shown)].equals(shown)
+
+
+def test_a_vocabulary_can_be_named_or_is_found_in_the_annotations(folder, tmp_path):
+    corpus = read_corpus(folder)
+    (tmp_path / "mine.txt").write_text("down\nup\nsideways\n")
+    named = solve_examples(corpus, tier="brows", vocabulary=read_vocabulary(tmp_path / "mine.txt"))
+    assert named[0].vocabulary.values == ("down", "up", "sideways", "none")
+    with pytest.raises(SignfaceError, match="not in the vocabulary"):
+        solve_examples(corpus, tier="brows", vocabulary=Vocabulary("brows", ("up",)))
+    with pytest.raises(SignfaceError, match=r"no tier nose@M\d or nose"):
+        solve_examples(corpus, tier="nose")
+    assert read_reference(next(iter(corpus)).annotation, tier="brows").table["kind"].eq("stable").all()
+
+
+def test_equal_annotations_that_touch_are_one(tmp_path):
+    rows = [(0.0, 0.5, "up"), (0.5, 0.9, "up"), (0.9, 1.2, "down"), (1.4, 1.6, "down")]
+    table = pd.DataFrame(rows, columns=["start_s", "end_s", "label"]).assign(kind="stable")
+    write_eaf(Segments(table), tmp_path / "take.eaf", tier="brows", vocabulary=BROWS)
+    reference = read_reference(tmp_path / "take.eaf", tier="brows")
+    assert reference.table["end_s"].tolist() == [0.9, 1.2, 1.6]
+    assert "merged 4 annotations into 3" in reference.history[-1]
+
+
+def test_a_model_of_a_tier_writes_that_tier_and_no_affect(examples, tmp_path):
+    model = train_model(examples, quick("knn3"))
+    annotation = annotate(examples[1].descriptors, model, channels=True)
+    assert annotation.tier == "brows"
+    assert "none" in set(annotation.segments.table["label"])
+    assert "raised" in str(annotation) or "lowered" in str(annotation)
+    file = write_eaf(annotation, tmp_path / "take.eaf", signer="M1")[0]
+    assert_valid(file)
+    root = read_document(file).getroot()
+    names = [tier.get("TIER_ID") for tier in root.iterfind("TIER")]
+    assert names[:2] == ["brows@M1", "brows-confidence@M1"]
+    assert names.count("brows@M1") == 1  # the channel of that name is not written too
+    assert not [name for name in names if name.startswith(("affect", "intensity"))]
+    assert read_vocabulary(file, tier="brows@M1") == BROWS
+    written = read_tiers(file)["brows@M1"]
+    found = annotation.segments.table.query("label != 'none'")
+    assert written["label"].tolist() == found["label"].tolist()
+    np.testing.assert_allclose(written["start_s"], found["start_s"], atol=0.001)
+
+
+def test_the_commands_train_and_evaluate_on_a_tier(folder, tmp_path, capsys):
+    model = tmp_path / "brows.skops"
+    assert not main(["train", str(folder), "-o", str(model), "--tier", "brows", "--classifier", "knn1"])
+    card = read_card(model)
+    assert (card.tier, card.vocabulary) == ("brows", BROWS.with_blank())
+    report = tmp_path / "report"
+    kinds = ["--train-kinds", "IE,SE,EU", "--test-kinds", "IE,SE,EU", "--protocol", "across"]
+    assert not main(
+        ["evaluate", str(folder), "-o", str(report), "--tier", "brows", "--classifiers", "knn1,hmm", *kinds]
+    )
+    metrics = json.loads((report / "metrics.json").read_text())
+    for section in ("manual_segments", "automatic_segments", "frames"):
+        scores = metrics["classifiers"]["knn1"][section]
+        assert scores["labels"] == ["up", "down", "none"]
+        assert scores["chance"] == pytest.approx(1 / 3)
+    assert "raised" in (report / "report.html").read_text()
+    take = next(iter(read_corpus(folder)))
+    assert not main(["annotate", str(take.path), "-o", str(tmp_path / "out.eaf"), "--classifier", str(model)])
+    assert [name for name in read_tiers(tmp_path / "out.eaf")] == ["brows"]
+    assert load_model(model).card == card
