@@ -100,8 +100,9 @@ def check(arguments: argparse.Namespace) -> int:
 
 def run_all(arguments: argparse.Namespace) -> int:
     """Run, show how far it is, and say at the end what became of the takes."""
+    from signface.corpus.jobs import BEFORE, CORRECTED, DONE, FAILED, LOGS
     from signface.corpus.manifest import read_corpus
-    from signface.corpus.running import ANNOTATED, BEFORE, CORRECTED, DONE, FAILED, LOGS, run_corpus
+    from signface.corpus.running import ANNOTATED, run_corpus
 
     corpus = read_corpus(arguments.corpus)
     output = arguments.output or corpus.folder / ANNOTATED

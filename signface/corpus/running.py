@@ -2,7 +2,7 @@
 
 - `run_corpus`: go through a corpus, yield an `Outcome` for each take.
 - `plan_jobs`: the jobs of a run, and the rows that cannot be one.
-- `annotate_job`: one take, in whatever process.
+- `signface.corpus.jobs`: one take, in whatever process.
 
 What is done is known from the disk alone. The descriptors of a take are in the store under the key of their origin; its
 annotation is done when its log ends with the key of everything that the annotation depends on, and the log is written
@@ -13,25 +13,19 @@ holds the time of day (except the logs), it ends with the same bytes.
 from __future__ import annotations
 
 import contextlib
-import datetime
-import hashlib
 import os
 import re
-import socket
-import time
-import traceback
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from signface.channels.rules import read_channels
 from signface.corpus.cluster import WorkerDied, on_cluster, on_cores
-from signface.corpus.describing import recipe_of, stored_or_solved
+from signface.corpus.describing import recipe_of
+from signface.corpus.jobs import ANNOTATING_CODE, FAILED, LOGS, Job, Outcome, annotate_job, solve_job, write_log
 from signface.corpus.manifest import Corpus, TakeEntry
 from signface.corpus.origin import (
-    SOLVING_CODE,
     Recipe,
     code_digest,
     find_origin,
@@ -43,104 +37,16 @@ from signface.corpus.signers import find_signer
 from signface.corpus.store import DescriptorStore
 from signface.elan.mapping import read_mapping
 from signface.errors import SignfaceError
-from signface.files import whole_file
 from signface.settings.eaf import EafOptions
 from signface.settings.solve import SolveSettings
 from signface.signer import Signer
 
 if TYPE_CHECKING:
-    from signface.label.model import TrainedModel
+    pass
 
 #: Where annotations go when nothing else is said, in the folder of the corpus.
 ANNOTATED = "annotated"
-LOGS = "logs"
 LOCK = ".lock"
-
-#: The date in every file of a run: the same corpus gives the same bytes on any day.
-DATE = "2000-01-01T00:00:00+00:00"
-
-#: The modules between descriptors and annotation files.
-ANNOTATING_CODE = ("frames.py", "segmentation", "label", "sequence", "channels", "elan", "annotation.py")
-
-#: What can become of a take. `corrected`: an annotator worked in its `.eaf`, which stays as it is.
-DONE, BEFORE, CORRECTED, FAILED = "done", "before", "corrected", "failed"
-
-
-@dataclass(frozen=True)
-class Job:
-    """All that a process needs to annotate one take.
-
-    Parameters
-    ----------
-    entry : TakeEntry
-    corpus : Path
-        Folder of the corpus.
-    output : Path
-        Folder of the annotations.
-    recipe : Recipe
-    classifier : str
-        A shipped name or a file.
-    model : str
-        SHA-256 of the classifier's file.
-    code : str
-        SHA-256 of the modules between descriptors and annotation.
-    options : EafOptions
-        How it is written, with absolute paths.
-    options_digest : str
-        Their SHA-256, the content of their files included.
-    signer : Signer
-        Who signs, with the level where the classifier needs one.
-    """
-
-    entry: TakeEntry
-    corpus: Path
-    output: Path
-    recipe: Recipe
-    classifier: str
-    model: str
-    code: str
-    options: EafOptions
-    options_digest: str
-    signer: Signer
-
-    @property
-    def take(self) -> str:
-        """Name of the take in the corpus."""
-        return take_name(self.entry, self.corpus)
-
-    @property
-    def eaf(self) -> Path:
-        """Where its annotation goes."""
-        return self.output / f"{self.take}.eaf"
-
-    @property
-    def log(self) -> Path:
-        """Where its log goes."""
-        return self.output / LOGS / f"{self.take}.log"
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What became of a take.
-
-    Parameters
-    ----------
-    take : str
-    state : str
-        `done`, `before` (nothing was left to do), `corrected` (left as the annotator made it) or `failed`.
-    solved : bool
-        Whether descriptors had to be solved.
-    message : str
-        What was found, or what is wrong.
-    seconds : float
-        How long it took.
-    """
-
-    take: str
-    state: str
-    solved: bool = False
-    message: str = ""
-    seconds: float = 0.0
 
 
 def run_corpus(
@@ -213,7 +119,7 @@ def run_corpus(
         for job, result in everywhere(annotate_job):
             if isinstance(result, WorkerDied):
                 result = Outcome(job.take, FAILED, message=f"{job.entry.path}: {result}")
-                _write_log(job, [result.message, FAILED])
+                write_log(job, [result.message, FAILED])
             yield result
         # Only now: a process of a run that was killed may have lived on for a while.
         clean_output(output, jobs)
@@ -262,14 +168,6 @@ def plan_jobs(
     return list(jobs.values()), failed
 
 
-def solve_job(job: Job) -> Outcome:
-    """Make sure that the store has the descriptors of a take; a take that cannot be solved is told when annotated."""
-    with contextlib.suppress(Exception):
-        origin = find_origin(job.entry, job.corpus, job.recipe)
-        stored_or_solved(job.entry, origin, DescriptorStore(job.corpus), job.corpus)
-    return Outcome(job.take, DONE)
-
-
 def _with_levels(jobs: list[Job], store: DescriptorStore) -> list[Job]:
     """The jobs with signers who have a level: of their file in the corpus, or of all their takes in the store."""
     signers = {}
@@ -285,55 +183,6 @@ def _with_levels(jobs: list[Job], store: DescriptorStore) -> list[Job]:
             signer = signer.with_level(solved) if solved else signer
         signers[name] = signer
     return [replace(job, signer=signers[job.entry.signer]) for job in jobs]
-
-
-def annotate_job(job: Job) -> Outcome:
-    """Solve and annotate one take and write its log; whatever goes wrong is told in the outcome, never raised."""
-    begun = time.monotonic()
-    notes: list[str] = []
-    try:
-        state, solved, message = _annotate(job, notes)
-    except SignfaceError as error:
-        state, solved, message = FAILED, False, str(error)
-    except Exception as error:  # a defect of ours in one take must not stop the others
-        state, solved = FAILED, False
-        message = f"{job.entry.path}: a defect of signface, {type(error).__name__}: {error}"
-        notes += traceback.format_exc().splitlines()
-    if state == FAILED:
-        with contextlib.suppress(SignfaceError, OSError):  # where nothing can be written, the outcome says so
-            _write_log(job, [*notes, message, FAILED])
-    return Outcome(job.take, state, solved, message, time.monotonic() - begun)
-
-
-def _annotate(job: Job, notes: list[str]) -> tuple[str, bool, str]:
-    """State, whether it was solved, and what was found; `notes` gets what the log should say."""
-    from signface.annotation import annotate
-    from signface.elan.writing import check_writable, write_eaf
-
-    if (job.recipe.solver, job.code) != (code_digest(*SOLVING_CODE), code_digest(*ANNOTATING_CODE)):
-        raise SignfaceError(
-            f"{socket.gethostname()} has another version of signface than the machine that began the run",
-            hint="install the same one everywhere",
-        )
-    origin = find_origin(job.entry, job.corpus, job.recipe)
-    ending = f"{DONE} {_annotation_key(job, origin.key)}"
-    if job.eaf.is_file() and _last_line(job.log) == ending:
-        return BEFORE, False, ""
-    store = DescriptorStore(job.corpus)
-    descriptors, solved = stored_or_solved(job.entry, origin, store, job.corpus)
-    notes += [f"recording {origin.file} (SHA-256 {origin.recording})", *descriptors.history]
-    notes.append(f"{'solved into' if solved else 'taken from'} {store.path(origin)}")
-    try:
-        check_writable(job.eaf)
-    except SignfaceError as error:
-        _write_log(job, [*notes, str(error), CORRECTED])
-        return CORRECTED, solved, f"{job.eaf}: was worked in and stays as it is"
-    model = _model(job.classifier, job.model)
-    annotation = annotate(descriptors, model, signer=job.signer, channels=job.options.channels or False)
-    properties = {"file": origin.file}
-    write_eaf(annotation, job.eaf, options=job.options, video=job.entry.video, date=DATE, properties=properties)
-    _write_log(job, [*notes, str(annotation), f"written to {job.eaf}", ending])
-    return DONE, solved, str(annotation)
 
 
 @contextlib.contextmanager
@@ -380,37 +229,6 @@ def clean_output(output: Path, jobs: list[Job]) -> None:
 def _names_of(job: Job) -> list[str]:
     stem = job.eaf.stem
     return [f"{stem}.eaf", f"{stem}.pfsx", f"{stem}.curves.csv", f"{stem}_tsconf.xml"]
-
-
-def _annotation_key(job: Job, descriptors: str) -> str:
-    """SHA-256 of all that an annotation depends on, from the key of the descriptors."""
-    video = "" if job.entry.video is None else os.path.relpath(job.entry.video, job.output)
-    parts = [descriptors, job.model, job.code, job.options_digest, job.entry.signer, video, job.signer.level_digest]
-    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
-
-
-def _write_log(job: Job, lines: list[str]) -> None:
-    """Write the log of a take; its last line says what became of it."""
-    now = datetime.datetime.now().astimezone().isoformat(timespec="seconds")
-    with whole_file(job.log) as temporary:
-        temporary.write_text("\n".join([f"{job.take}, {now}, {socket.gethostname()}", *lines, ""]), encoding="utf-8")
-
-
-def _last_line(log: Path) -> str:
-    try:
-        return log.read_text(encoding="utf-8").rstrip("\n").rpartition("\n")[2]
-    except (OSError, UnicodeDecodeError):
-        return ""
-
-
-@lru_cache(maxsize=2)
-def _model(classifier: str, digest: str) -> TrainedModel:
-    """A classifier whose content is the one that was asked for."""
-    from signface.label.persistence import load_model
-
-    if shipped_digest("classifiers", ".skops", classifier) != digest:
-        raise SignfaceError("is not the classifier that the run began with", file=classifier, hint="run again")
-    return load_model(classifier)
 
 
 def _absolute(entry: TakeEntry) -> TakeEntry:

@@ -16,8 +16,9 @@ from lxml import etree
 
 from signface.cli.main import main
 from signface.corpus.cluster import WorkerDied, on_cores
+from signface.corpus.jobs import BEFORE, CORRECTED, DONE, FAILED
 from signface.corpus.manifest import Corpus, TakeEntry, read_corpus, write_takes
-from signface.corpus.running import BEFORE, CORRECTED, DONE, FAILED, run_corpus
+from signface.corpus.running import run_corpus
 from signface.descriptors_files import write_weights
 from signface.errors import SignfaceError
 from signface.label.persistence import save_model
