@@ -69,24 +69,24 @@ class Material:
     def skins(self) -> list[np.ndarray]:
         """(F, V, 3) displacements of the skin of each actor in the frames looked at; 0 where nothing moves."""
         moving = self.sites.moving
-        found = []
+        skins = []
         for actor, weights in zip(self.actors, self.weights):
             skin = np.zeros((len(weights), *self.face.mesh.vertices.shape))
             skin[:, moving] = actor.head.skin(weights, moving) - actor.head.face.mesh.vertices[moving]
-            found.append(skin)
-        return found
+            skins.append(skin)
+        return skins
 
     @cached_property
     def rows(self) -> np.ndarray:
         """The trajectories to cluster."""
-        own = self.sites.clustered
+        clustered = self.sites.clustered
         mirror = None
         if self.rules.symmetric:
-            place = np.full(len(self.face.mesh.vertices), -1)
-            place[own] = np.arange(len(own))
-            mirror = place[self.sites.mirror[own]]
-            mirror = np.where(mirror < 0, np.arange(len(own)), mirror)
-        return trajectories([skin[:, own] for skin in self.skins], mirror)
+            row_of = np.full(len(self.face.mesh.vertices), -1)
+            row_of[clustered] = np.arange(len(clustered))
+            mirror = row_of[self.sites.mirror[clustered]]
+            mirror = np.where(mirror < 0, np.arange(len(clustered)), mirror)
+        return trajectories([skin[:, clustered] for skin in self.skins], mirror)
 
     @cached_property
     def _shell(self) -> ThinShell:
@@ -96,8 +96,8 @@ class Material:
     def _reconstruction(self) -> Reconstruction:
         union = self.sites.union
         positions = np.concatenate([skin[:, union] - skin[:, union].mean(axis=0) for skin in self.skins])
-        shown = [actor.shown(weights) for actor, weights in zip(self.actors, self.weights)]
-        targets = np.concatenate([own - own.mean(axis=0) for own in shown])
+        seen_weights = [actor.shown(weights) for actor, weights in zip(self.actors, self.weights)]
+        targets = np.concatenate([moved - moved.mean(axis=0) for moved in seen_weights])
         noise = placement_noise(self.face, np.concatenate(self.skins), union)
         return Reconstruction(self.sites, positions, targets, skin_metric(self.face), noise)
 

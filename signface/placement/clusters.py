@@ -74,9 +74,9 @@ def trajectories(skins: Sequence[np.ndarray], mirror: np.ndarray | None = None) 
         deviation = np.maximum(flat.std(axis=0), STILL_MM)
         rows = (flat / deviation).transpose(1, 0, 2)
         seen = [rows] if mirror is None else [rows, rows[mirror] * (-1.0, 1.0, 1.0)]
-        for own in seen:
-            own = own.reshape(len(own), -1)
-            gram = gram + own @ own.T
+        for sample in seen:
+            sample = sample.reshape(len(sample), -1)
+            gram = gram + sample @ sample.T
     values, vectors = np.linalg.eigh(gram)
     values, vectors = np.maximum(values[::-1], 0.0), vectors[:, ::-1]
     if values[0] <= 0.0:
@@ -115,11 +115,13 @@ def cluster_markers(rows: np.ndarray, sites: Sites, count: int, *, seed: int = 0
             f"the fixed marker on vertex {hidden[0]} stands below the jaw or hidden, where nothing is clustered",
             hint="choose another method than k-means, or leave it out",
         )
-    own = np.array([where[int(group[-1] if sites.vertices[group[-1], 0] > 0 else group[0])] for group in sites.groups])
+    site_rows = np.array(
+        [where[int(group[-1] if sites.vertices[group[-1], 0] > 0 else group[0])] for group in sites.groups]
+    )
     if not sites.rules.symmetric:
-        found = KMeans(count, n_init=STARTS, random_state=seed).fit(rows)
+        fit = KMeans(count, n_init=STARTS, random_state=seed).fit(rows)
         fixed = rows[[where[vertex] for vertex in sites.rules.fixed]]
-        _place(board, rows, own, found, _others(found.cluster_centers_, fixed))
+        _place(board, rows, site_rows, fit, _others(fit.cluster_centers_, fixed))
         return Clusters(tuple(board.chosen), _nearest(rows, rows[[where[v] for v in board.chosen]]))
 
     across = sites.vertices[sites.clustered, 0]
@@ -129,18 +131,18 @@ def cluster_markers(rows: np.ndarray, sites: Sites, count: int, *, seed: int = 0
     free = board.left
     best: tuple[int, KMeans, np.ndarray, int] | None = None
     for pieces in range(max(1, -(-free // 2)), min(-(-free // 2) + 7, free, len(half)) + 1):
-        found = KMeans(pieces + len(fixed), n_init=STARTS, random_state=seed).fit(rows[half])
-        kept = _others(found.cluster_centers_, fixed)
-        centres = np.array([np.abs(across[half[found.labels_ == k]]).mean() for k in kept])
+        fit = KMeans(pieces + len(fixed), n_init=STARTS, random_state=seed).fit(rows[half])
+        kept = _others(fit.cluster_centers_, fixed)
+        centres = np.array([np.abs(across[half[fit.labels_ == k]]).mean() for k in kept])
         middle = 2 * pieces - free  # clusters that must get a marker on the midline
         cost = abs(int((centres < MIDDLE_MM).sum()) - middle)
         if best is None or cost < best[0]:
-            best = cost, found, kept[np.argsort(centres)], middle
+            best = cost, fit, kept[np.argsort(centres)], middle
     if best is not None:
-        _, found, order, middle = best
+        _, fit, order, middle = best
         single = np.array([len(group) == 1 for group in sites.groups])
-        _place(board, rows, own, found, order[:middle], single)
-        _place(board, rows, own, found, order[middle:], ~single)
+        _place(board, rows, site_rows, fit, order[:middle], single)
+        _place(board, rows, site_rows, fit, order[middle:], ~single)
     return Clusters(tuple(board.chosen), _nearest(rows, rows[[where[v] for v in board.chosen]]))
 
 
@@ -151,15 +153,20 @@ def _others(means: np.ndarray, fixed: np.ndarray) -> np.ndarray:
 
 
 def _place(
-    board: Board, rows: np.ndarray, own: np.ndarray, found: KMeans, order: np.ndarray, kind: np.ndarray | None = None
+    board: Board,
+    rows: np.ndarray,
+    site_rows: np.ndarray,
+    fit: KMeans,
+    order: np.ndarray,
+    kind: np.ndarray | None = None,
 ) -> None:
     """Put a marker into each of some clusters, the largest first: on the free site nearest to its centroid.
 
     Among its own vertices: a centroid is shorter than its members, and what hardly moves lies near to any. A cluster
     without a free site of its own gets the nearest elsewhere.
     """
-    sizes = np.bincount(found.labels_, minlength=len(found.cluster_centers_))
-    clusters = found.predict(rows[own])
+    sizes = np.bincount(fit.labels_, minlength=len(fit.cluster_centers_))
+    clusters = fit.predict(rows[site_rows])
     for cluster in sorted(order, key=lambda k: -sizes[k]):
         if not board.left:
             return
@@ -169,7 +176,7 @@ def _place(
         if (free & (clusters == cluster)).any():
             free = free & (clusters == cluster)
         open_sites = np.flatnonzero(free)
-        distance = np.linalg.norm(rows[own[open_sites]] - found.cluster_centers_[cluster], axis=1)
+        distance = np.linalg.norm(rows[site_rows[open_sites]] - fit.cluster_centers_[cluster], axis=1)
         board.take(int(open_sites[int(np.argmin(distance))]))
 
 

@@ -266,8 +266,8 @@ def run_cells(
         delayed(evaluate_layout)(face, candidate.layout, actors, tested, condition=condition, draw=draw)
         for candidate, condition, draw in left.values()
     )
-    shown = runs if progress is None else progress(runs, len(left), len(known) - len(left))
-    for file, errors in zip(left, shown):
+    results = runs if progress is None else progress(runs, len(left), len(known) - len(left))
+    for file, errors in zip(left, results):
         save_cell(errors, file)
         known[file] = errors
     return [

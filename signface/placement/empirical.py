@@ -80,8 +80,8 @@ def find_landmarks(face: FaceModel) -> dict[str, np.ndarray]:
     else:
         from signface.face.suggestion import suggest_layout
 
-        found = suggest_layout(layout.labels, layout.points(default), face).layout
-        places = found.points(face, layout.labels)
+        carried = suggest_layout(layout.labels, layout.points(default), face).layout
+        places = carried.points(face, layout.labels)
     return dict(zip(layout.labels, places))
 
 
@@ -118,16 +118,16 @@ def place_layout(name: str, face: FaceModel, *, landmarks: dict[str, np.ndarray]
         raise SignfaceError(f"no empirical layout is called {name}", hint=f"they are {', '.join(EMPIRICAL)}")
     known = find_landmarks(face) if landmarks is None else landmarks
     _, markers = _tables()
-    own = markers[[name in layouts.split() for layouts in markers["layouts"]]]
+    placed_markers = markers[[name in layouts.split() for layouts in markers["layouts"]]]
     points = []
-    for row in own.itertuples(index=False):
+    for row in placed_markers.itertuples(index=False):
         terms = [term.strip() for term in str(row.place).split("+")]
         missing = [term for term in terms if term not in known]
         if missing:
             raise SignfaceError(f"the marker {row.marker} of {name} needs the landmark {missing[0]}")
         points.append(np.mean([known[term] for term in terms], axis=0))
     corners, barycentric, _ = nearest_points(face.mesh, np.array(points))
-    placed = MarkerLayout(tuple(own["marker"]), tuple(own["role"]), corners, barycentric, name)
+    placed = MarkerLayout(tuple(placed_markers["marker"]), tuple(placed_markers["role"]), corners, barycentric, name)
     return placed if placed.head_labels else with_head_markers(placed, face)
 
 

@@ -125,12 +125,12 @@ def evaluate_layout(
         raise SignfaceError(f"no mapping is called {unknown[0]}", hint=f"they are {', '.join(MAPPINGS)}")
     metric = skin_metric(face)
     worn = [_Worn.by(actor, layout, condition, draw) for actor in actors]
-    found: list[Errors] = []
+    errors: list[Errors] = []
 
     def note(mapping: str, train: str, test: _Worn, weights: np.ndarray) -> None:
         error = weights - test.truth
         moment = error.T @ error / len(error)
-        found.append(Errors(mapping, train, test.actor.name, float(np.sqrt((metric * moment).sum())), moment))
+        errors.append(Errors(mapping, train, test.actor.name, float(np.sqrt((metric * moment).sum())), moment))
 
     learners: dict[str, Callable[[_Worn], object]] = {"gp": _train_exact, "sogp": _train_sparse}
     for mapping in mappings:
@@ -150,7 +150,7 @@ def evaluate_layout(
             for test in worn:
                 if test.actor.name in tested and test is not train:
                     note(mapping, train.actor.name, test, model.predict(test.scaled(test.takes)))  # type: ignore[attr-defined]
-    return found
+    return errors
 
 
 @dataclass(frozen=True)
@@ -165,10 +165,10 @@ class _Worn:
     @classmethod
     def by(cls, actor: Actor, layout: MarkerLayout, condition: str, draw: int) -> _Worn:
         rng = np.random.default_rng([actor.seed, draw])
-        own = Virtual.clean(layout) if condition == "clean" else Virtual.glued(layout, actor, rng)
-        neutral = own.record(actor, np.zeros((NEUTRAL_FRAMES, actor.takes.shape[1])), rng).mean(axis=0)
-        training = own.record(actor, actor.range_of_motion[::EVERY], rng)
-        return cls(actor, training, own.record(actor, actor.takes[::EVERY], rng), neutral)
+        markers = Virtual.clean(layout) if condition == "clean" else Virtual.glued(layout, actor, rng)
+        neutral = markers.record(actor, np.zeros((NEUTRAL_FRAMES, actor.takes.shape[1])), rng).mean(axis=0)
+        training = markers.record(actor, actor.range_of_motion[::EVERY], rng)
+        return cls(actor, training, markers.record(actor, actor.takes[::EVERY], rng), neutral)
 
     @property
     def truth(self) -> np.ndarray:

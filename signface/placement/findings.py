@@ -29,11 +29,11 @@ def flattening(table: pd.DataFrame) -> pd.DataFrame:
     """
     means = table.groupby(["family", "condition", "mapping", "markers"], sort=False)["rms_mm"].mean().reset_index()
     rows = []
-    for (family, condition, mapping), own in means.groupby(["family", "condition", "mapping"], sort=False):
-        if len(own) < 3:
+    for (family, condition, mapping), curve in means.groupby(["family", "condition", "mapping"], sort=False):
+        if len(curve) < 3:
             continue
-        own = own.sort_values("markers")
-        error, markers = own["rms_mm"].to_numpy(), own["markers"].to_numpy()
+        curve = curve.sort_values("markers")
+        error, markers = curve["rms_mm"].to_numpy(), curve["markers"].to_numpy()
         least = int(error.argmin())
         enough = int(markers[error <= (1.0 + FLAT) * error[least]].min())
         rows.append((family, condition, mapping, error[least], int(markers[least]), enough, error[0]))
@@ -52,10 +52,10 @@ def against(table: pd.DataFrame, one: str, other: str) -> pd.DataFrame:
     """
     joined = table[table["layout"] == one].merge(table[table["layout"] == other], on=_KEYS, suffixes=("", "_other"))
     rows = []
-    for (condition, mapping), own in joined.groupby(["condition", "mapping"], sort=False):
-        mean, rival = own["rms_mm"].mean(), own["rms_mm_other"].mean()
-        better = float((own["rms_mm"] < own["rms_mm_other"]).mean())
-        rows.append((condition, mapping, mean, rival, 1.0 - mean / rival, better, len(own)))
+    for (condition, mapping), pairs in joined.groupby(["condition", "mapping"], sort=False):
+        mean, rival = pairs["rms_mm"].mean(), pairs["rms_mm_other"].mean()
+        better = float((pairs["rms_mm"] < pairs["rms_mm_other"]).mean())
+        rows.append((condition, mapping, mean, rival, 1.0 - mean / rival, better, len(pairs)))
     return pd.DataFrame(rows, columns=["condition", "mapping", "one_mm", "other_mm", "change", "better", "pairs"])
 
 
@@ -69,11 +69,11 @@ def same_size(table: pd.DataFrame, empirical: tuple[str, ...] = ("man", "star", 
     """
     sizes = table.drop_duplicates("layout").set_index("layout")[["family", "markers"]]
     rows = []
-    for layout, own in sizes.iterrows():
-        if own["family"] in empirical:
+    for layout, size in sizes.iterrows():
+        if size["family"] in empirical:
             continue
         for rival, other in sizes.iterrows():
-            if other["family"] in empirical and abs(other["markers"] - own["markers"]) <= NEAR:
+            if other["family"] in empirical and abs(other["markers"] - size["markers"]) <= NEAR:
                 for r in against(table, str(layout), str(rival)).itertuples(index=False):
                     rows.append((layout, rival, r.condition, r.mapping, r.change, r.better))
     return pd.DataFrame(rows, columns=["layout", "rival", "condition", "mapping", "change", "better"])

@@ -130,12 +130,12 @@ class Reconstruction(_OnUnion):
     ) -> None:
         super().__init__(sites)
         values, vectors = np.linalg.eigh(metric)
-        shown = targets @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+        moved = targets @ (vectors * np.sqrt(np.maximum(values, 0.0)))
         flat = positions.reshape(len(positions), -1)
         self._covariance = flat.T @ flat / len(flat)
-        self._cross = flat.T @ shown / len(flat)
+        self._cross = flat.T @ moved / len(flat)
         self._noise = np.repeat(noise, 3)
-        self.error = float((shown**2).sum() / len(shown))
+        self.error = float((moved**2).sum() / len(moved))
 
     def gains(self) -> np.ndarray:
         """(S,) by how much each site would lower the mean squared error."""
@@ -194,9 +194,9 @@ class OptimalDesign(_OnUnion):
         result = np.empty(len(self.blocks))
         for size in {len(block) for block in self.blocks}:
             which = [k for k, block in enumerate(self.blocks) if len(block) == size]
-            own = self._columns[np.array([self.blocks[k] for k in which])]
-            spread = own @ self._covariance
-            inner = spread @ own.transpose(0, 2, 1) + np.eye(size)
+            columns = self._columns[np.array([self.blocks[k] for k in which])]
+            spread = columns @ self._covariance
+            inner = spread @ columns.transpose(0, 2, 1) + np.eye(size)
             if self._metric is None:
                 result[which] = np.linalg.slogdet(inner)[1]
             else:
@@ -205,9 +205,11 @@ class OptimalDesign(_OnUnion):
 
     def add(self, vertices: Sequence[int]) -> None:
         """Add the information of markers at these vertices."""
-        own = self._columns[self.rows(vertices)]
-        spread = own @ self._covariance
-        self._covariance = self._covariance - spread.T @ np.linalg.solve(spread @ own.T + np.eye(len(own)), spread)
+        columns = self._columns[self.rows(vertices)]
+        spread = columns @ self._covariance
+        self._covariance = self._covariance - spread.T @ np.linalg.solve(
+            spread @ columns.T + np.eye(len(columns)), spread
+        )
 
 
 class ThinShell(_OnUnion):
@@ -248,9 +250,9 @@ class ThinShell(_OnUnion):
 
     def gains(self) -> np.ndarray:
         """(S,) by how much each site would lower the squared residual of the training poses."""
-        own = self._rows
-        variance = np.maximum(self._kernel[own, np.arange(len(own))], 1e-12)
-        residual = self._residual[own]
+        rows = self._rows
+        variance = np.maximum(self._kernel[rows, np.arange(len(rows))], 1e-12)
+        residual = self._residual[rows]
         toward = np.einsum("vu,vu->u", self._kernel, self._residual @ residual.T) / variance
         size = np.einsum("vu,vu->u", self._kernel, self._kernel) * (residual**2).sum(axis=1) / variance**2
         single = 2.0 * toward - size

@@ -98,6 +98,6 @@ def spelt(value: object, places: int = 2) -> str:
     if value is None or (isinstance(value, float) and pd.isna(value)) or value is pd.NA:
         return "–"
     if isinstance(value, float):
-        shown = f"{value:.{places}f}"
-        return shown.replace("-", "−") if float(shown) else shown.replace("-", "")
+        digits = f"{value:.{places}f}"
+        return digits.replace("-", "−") if float(digits) else digits.replace("-", "")
     return str(value)

@@ -343,54 +343,59 @@ def _once(table: pd.DataFrame, warnings: list[str], problems: list[str]) -> pd.D
 
 def _doubts(responses: Responses) -> list[str]:
     """What is no error but changes what can be concluded."""
-    table, found = responses.table, []
+    table, warnings = responses.table, []
     if responses.simulated:
-        found.append("SIMULATED ANSWERS: no participant was asked; nothing can be concluded from them")
+        warnings.append("SIMULATED ANSWERS: no participant was asked; nothing can be concluded from them")
     if len(responses.methods) == 1:
-        found.append(
+        warnings.append(
             f"one method only ({responses.methods[0]}): nothing to compare, the tests between methods are left out"
         )
     if len(responses.participants) < 5:
-        found.append(
+        warnings.append(
             f"{len(responses.participants)} participants: too few for intervals over participants to mean much"
         )
-    shown = table.groupby(["expression", "method"]).size().unstack(fill_value=0)
-    empty = [f"{row} × {column}" for row in shown.index for column in shown.columns if shown.loc[row, column] == 0]
+    answer_counts = table.groupby(["expression", "method"]).size().unstack(fill_value=0)
+    empty = [
+        f"{row} × {column}"
+        for row in answer_counts.index
+        for column in answer_counts.columns
+        if answer_counts.loc[row, column] == 0
+    ]
     if empty:
-        found.append(f"no answer for {_listed(empty)}: the tests over expression and method are left out")
-    elif shown.to_numpy().min() != shown.to_numpy().max():
-        found.append(
+        warnings.append(f"no answer for {_listed(empty)}: the tests over expression and method are left out")
+    elif answer_counts.to_numpy().min() != answer_counts.to_numpy().max():
+        warnings.append(
             "not every expression was shown equally often with every method: means by method mix unequal shares"
         )
     counts = table.groupby("participant").size()
     if counts.nunique() > 1:
         fewer = counts[counts < counts.max()]
-        found.append(
+        warnings.append(
             f"{len(fewer)} of {len(counts)} participants gave fewer than {counts.max()} answers "
             f"(the fewest: {counts.idxmin()} with {counts.min()}): pairs are made of the answers that exist"
         )
     strange = sorted(set(table["answer_expression"].dropna()) - set(table["expression"]))
     if strange:
-        found.append(f"answers name expressions that were never played: {_listed(strange)}")
+        warnings.append(f"answers name expressions that were never played: {_listed(strange)}")
     for column, title in responses.questions.items():
         if table[column].nunique() == 1 and column != "correct":
-            found.append(f"every answer about {title} is {table[column].dropna().iloc[0]:g}: nothing to test")
+            warnings.append(f"every answer about {title} is {table[column].dropna().iloc[0]:g}: nothing to test")
         elif column in SCALES:
             each = table.dropna(subset=[column]).groupby("participant")[column].agg(["nunique", "size"])
             flat = each[(each["nunique"] == 1) & (each["size"] > 5)]
             if len(flat):
-                found.append(f"always the same answer about {title}: {_listed(list(flat.index))}")
+                warnings.append(f"always the same answer about {title}: {_listed(list(flat.index))}")
     if "correct" in responses.questions and table["correct"].nunique() == 1:
-        found.append("every expression was recognised, or none: nothing to test about accuracy")
+        warnings.append("every expression was recognised, or none: nothing to test about accuracy")
     for column, title in PERSONAL.items():
         people = responses.people()[column]
         if people.notna().any() and people.isna().any():
-            found.append(f"{int(people.isna().sum())} participants did not give their {title}")
+            warnings.append(f"{int(people.isna().sum())} participants did not give their {title}")
         if people.nunique() == 1 and len(people) > 1:
-            found.append(
+            warnings.append(
                 f"all participants have the same {title} ({people.dropna().iloc[0]}): its influence is not analysed"
             )
-    return found
+    return warnings
 
 
 def _listed(names: Sequence[str]) -> str:

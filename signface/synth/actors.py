@@ -154,14 +154,14 @@ class Virtual(Content):
     @classmethod
     def glued(cls, layout: MarkerLayout, actor: Actor, rng: np.random.Generator) -> Virtual:
         """Each marker 1 to 3 mm from its point along the skin, with the jitter of cameras (0.1 to 0.3 mm)."""
-        own = glue_markers(actor.head, layout.restricted(layout.face_labels), rng)
-        return cls(own.corners, own.barycentric, rng.uniform(*JITTER_MM, len(own.labels)))
+        glued = glue_markers(actor.head, layout.restricted(layout.face_labels), rng)
+        return cls(glued.corners, glued.barycentric, rng.uniform(*JITTER_MM, len(glued.labels)))
 
     def record(self, actor: Actor, weights: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """(F, P, 3) positions in the head's frame, millimetres."""
         vertices, where = np.unique(self.corners, return_inverse=True)
         skin = actor.head.skin(weights, vertices)
-        own = np.zeros((len(weights), len(self.corners), 3))
+        recorded = np.zeros((len(weights), len(self.corners), 3))
         for corner, share in zip(where.reshape(self.corners.shape).T, self.barycentric.T):
-            own += skin[:, corner] * share[:, None]
-        return own + rng.standard_normal(own.shape) * (self.jitter / np.sqrt(3.0))[:, None]
+            recorded += skin[:, corner] * share[:, None]
+        return recorded + rng.standard_normal(recorded.shape) * (self.jitter / np.sqrt(3.0))[:, None]

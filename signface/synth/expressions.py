@@ -215,9 +215,9 @@ def draw_units(
     amplitude = spread.amplitude[intensity - 1] * habits.expressivity * np.exp(rng.normal(0.0, 0.10))
     strengths = {}
     for unit, strength in PROTOTYPES[affect][variant].items():
-        shown = rng.random() >= spread.missing
+        present = rng.random() >= spread.missing
         factor = habits.gains[affect, unit] * np.exp(rng.normal(0.0, spread.repetition))
-        strengths[unit] = float(strength * amplitude * factor) if shown else 0.0
+        strengths[unit] = float(strength * amplitude * factor) if present else 0.0
     if max(strengths.values()) < 0.5 * amplitude * max(PROTOTYPES[affect][variant].values()):
         # An annotator would not have seen the affect: its first (defining) unit is shown after all.
         first = next(iter(PROTOTYPES[affect][variant]))
@@ -291,8 +291,8 @@ def base_weights(shape: dict[str, float], names: tuple[str, ...], asymmetry: flo
     for name, weight in shape.items():
         sides = (("Left", 1 + asymmetry), ("Right", 1 - asymmetry)) if "*" in name else (("", 1.0),)
         for side, factor in sides:
-            own = name.replace("*", side)
-            if own not in names:
-                raise SignfaceError(f"the face has no base named {own}", hint="synthesise with the default face")
-            weights[names.index(own)] += weight * factor
+            base = name.replace("*", side)
+            if base not in names:
+                raise SignfaceError(f"the face has no base named {base}", hint="synthesise with the default face")
+            weights[names.index(base)] += weight * factor
     return weights

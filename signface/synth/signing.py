@@ -111,10 +111,10 @@ def grammar_track(
     time: np.ndarray, marking: str, start: float, end: float, names: tuple[str, ...], rng: np.random.Generator
 ) -> np.ndarray:
     """(F, N) weights of a grammatical face over its stretch of the utterance."""
-    own = GRAMMAR[marking]
-    face = unit_weights({unit: s * np.exp(rng.normal(0.0, 0.2)) for unit, s in own.units.items()}, names)
-    if own.mouth is not None:
-        face = face + base_weights(own.mouth, names) * np.exp(rng.normal(0.0, 0.2))
+    grammar = GRAMMAR[marking]
+    face = unit_weights({unit: s * np.exp(rng.normal(0.0, 0.2)) for unit, s in grammar.units.items()}, names)
+    if grammar.mouth is not None:
+        face = face + base_weights(grammar.mouth, names) * np.exp(rng.normal(0.0, 0.2))
     rise, fall = rng.uniform(0.12, 0.30), rng.uniform(0.15, 0.40)
     wavering = 1.0 + 0.12 * smooth_noise(rng, len(time), 1.0 / (time[1] - time[0]), 1.0)
     return pulse(time, start, end, rise, fall)[:, None] * wavering * face

@@ -71,21 +71,21 @@ def _accuracy_panel(panel: Axes, classifiers: Mapping[str, Mapping]) -> None:
     names = list(classifiers)
     for number, (section, (colour, hatch)) in enumerate(BARS.items()):
         scores = [classifiers[name][section] for name in names]
-        accuracy = np.array([_float(own["accuracy"]) for own in scores])
+        accuracy = np.array([_float(scored["accuracy"]) for scored in scores])
         place = np.arange(len(names)) + 0.38 * (number - 0.5)
         title = {"manual_segments": "manual segments", "automatic_segments": "automatic segments"}[section]
         panel.bar(
             place, accuracy.tolist(), width=0.36, color=colour, hatch=hatch, edgecolor="white", linewidth=0, label=title
         )
-        for at, own, value in zip(place, scores, accuracy, strict=True):
-            low, high = own.get("accuracy_interval") or (value, value)
+        for at, scored, value in zip(place, scores, accuracy, strict=True):
+            low, high = scored.get("accuracy_interval") or (value, value)
             if low < high:
                 panel.plot([at, at], [low, high], color="#222222", linewidth=1)
             if np.isfinite(value):
                 panel.annotate(
                     f"{value:.2f}", (at, max(high, value)), (0, 2), textcoords="offset points", ha="center", fontsize=8
                 )
-        majority = [_float(own["majority"]) for own in scores]
+        majority = [_float(scored["majority"]) for scored in scores]
         panel.hlines(
             majority,
             place - 0.18,
@@ -140,8 +140,8 @@ def draw_segmentation(table: pd.DataFrame) -> Figure:
 
 def _method(row: Mapping[str, Any]) -> str:
     """Name of a row of the segmentation's table."""
-    said = {"within": "same signer", "across": "other signers"}.get(row["protocol"], "")
-    return f"{_short(row['method'])}, {said}" if said else _short(row["method"])
+    tested_on = {"within": "same signer", "across": "other signers"}.get(row["protocol"], "")
+    return f"{_short(row['method'])}, {tested_on}" if tested_on else _short(row["method"])
 
 
 def draw_confusions(sections: Mapping[str, Mapping], *, columns: int = 3) -> Figure:
@@ -263,10 +263,10 @@ def draw_reliability(curves: Mapping[str, Sequence[Mapping[str, float]]]) -> Fig
         panel = figure.subplots()
         panel.plot([0, 1], [0, 1], color="#999999", linewidth=1, linestyle="--")
         for number, (name, bins) in enumerate(curves.items()):
-            kept = [own for own in bins if own["n"] >= LEAST_BIN]
+            kept = [share for share in bins if share["n"] >= LEAST_BIN]
             panel.plot(
-                [own["confidence"] for own in kept],
-                [own["accuracy"] for own in kept],
+                [share["confidence"] for share in kept],
+                [share["accuracy"] for share in kept],
                 MARKS[number % len(MARKS)] + "-",
                 color=COLOURS[number % len(COLOURS)],
                 markersize=5,

@@ -55,11 +55,11 @@ def draw_importance(table: pd.DataFrame, face: FaceModel | None, *, title: str) 
     """
     from matplotlib.figure import Figure
 
-    shown = table.head(BARS)
+    largest = table.head(BARS)
     named = {name for bases in table["bases"] for name in bases.split()}
     painted = face is not None and named <= set(face.names)
     with styled():
-        figure = Figure(figsize=(9.4 if painted else 5.4, 0.9 + 0.235 * len(shown)), layout="constrained")
+        figure = Figure(figsize=(9.4 if painted else 5.4, 0.9 + 0.235 * len(largest)), layout="constrained")
         if painted:
             assert face is not None
             halves = figure.subfigures(1, 2, width_ratios=[1.05, 1], squeeze=False)[0]
@@ -67,14 +67,14 @@ def draw_importance(table: pd.DataFrame, face: FaceModel | None, *, title: str) 
             panel = halves[0].subplots()
         else:
             panel = figure.subplots()
-        lost = shown["accuracy_lost"].to_numpy(float)
-        panel.barh(range(len(shown)), lost, height=0.7, color="#0072b2")
-        for at, (low, high) in enumerate(shown[["low", "high"]].to_numpy(float)):
+        lost = largest["accuracy_lost"].to_numpy(float)
+        panel.barh(range(len(largest)), lost, height=0.7, color="#0072b2")
+        for at, (low, high) in enumerate(largest[["low", "high"]].to_numpy(float)):
             if np.isfinite([low, high]).all():
                 panel.plot([low, high], [at, at], color="#222222", linewidth=1)
         panel.axvline(0, color="#777777", linewidth=0.8)
-        panel.set_yticks(range(len(shown)), shown["group"])
-        panel.set_ylim(len(shown) - 0.4, -0.6)
+        panel.set_yticks(range(len(largest)), largest["group"])
+        panel.set_ylim(len(largest) - 0.4, -0.6)
         panel.set_xlabel("accuracy lost")
         panel.xaxis.grid(True)
         panel.tick_params(axis="y", length=0)

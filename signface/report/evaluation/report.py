@@ -44,7 +44,7 @@ def write_report(evaluated: Evaluated, folder: Path) -> Path:
         text = json.dumps(evaluated.metrics, indent=1, ensure_ascii=False) + "\n"
         temporary.write_text(text, encoding="utf-8")
     drawn = draw_all(evaluated)
-    for figure in [figure for own in drawn.values() for figure in own]:
+    for figure in [figure for section in drawn.values() for figure in section]:
         save_vector(figure.figure, figure.svg, folder / "figures", figure.name)
     for name, table in files(evaluated).items():
         with whole_file(folder / f"{name}.csv") as temporary:
@@ -56,7 +56,7 @@ def write_report(evaluated: Evaluated, folder: Path) -> Path:
 
 def files(evaluated: Evaluated) -> dict[str, pd.DataFrame]:
     """Every table, by the name of its file."""
-    found = {}
+    frames_of = {}
     results, signers, pairs, curves, importance = [], [], [], [], []
     for protocol, part in evaluated.parts.items():
         results.append(tables.results_table(part["classifiers"]).assign(protocol=protocol))
@@ -64,7 +64,7 @@ def files(evaluated: Evaluated) -> dict[str, pd.DataFrame]:
         pairs.append(tables.mcnemar_table(part["mcnemar"]).assign(protocol=protocol))
         curves.append(pd.DataFrame(evaluated.metrics["learning_curve"].get(protocol, [])).assign(protocol=protocol))
         for name, sections in part["classifiers"].items():
-            found[f"confusion_{protocol}_{name}"] = tables.confusion_table(sections)
+            frames_of[f"confusion_{protocol}_{name}"] = tables.confusion_table(sections)
     for name, rows in evaluated.metrics["importance"].items():
         importance.append(pd.DataFrame(rows).assign(classifier=name))
     named = {
@@ -80,8 +80,8 @@ def files(evaluated: Evaluated) -> dict[str, pd.DataFrame]:
     for name, frames in named.items():
         kept = [frame for frame in frames if len(frame)]
         if kept:
-            found[name] = pd.concat(kept, ignore_index=True)
-    return found
+            frames_of[name] = pd.concat(kept, ignore_index=True)
+    return frames_of
 
 
 def draw_all(evaluated: Evaluated) -> dict[str, list[Drawn]]:
@@ -140,7 +140,9 @@ def draw_all(evaluated: Evaluated) -> dict[str, list[Drawn]]:
                 f"Shares of fewer than {figures.LEAST_BIN} segments are not drawn.",
             )
         )
-    points = [pd.DataFrame(own).assign(protocol=protocol) for protocol, own in metrics["learning_curve"].items() if own]
+    points = [
+        pd.DataFrame(curve).assign(protocol=protocol) for protocol, curve in metrics["learning_curve"].items() if curve
+    ]
     if points:
         drawn["curve"].append(
             Drawn(
@@ -185,15 +187,17 @@ def _take(evaluated: Evaluated, verdict: TakeVerdict) -> Drawn:
     example = _example(evaluated, verdict)
     short = {"within": "same signer", "across": "other signers"}
     rows = {
-        short.get(protocol, protocol): own[evaluated.best][verdict.take]
-        for protocol, own in evaluated.found.items()
-        if verdict.take in own.get(evaluated.best, {})
+        short.get(protocol, protocol): of_protocol[evaluated.best][verdict.take]
+        for protocol, of_protocol in evaluated.found.items()
+        if verdict.take in of_protocol.get(evaluated.best, {})
     }
     first = next(iter(rows))
-    boundaries, found, pairs = match_boundaries(example.reference.table, rows[first].table, tolerance_s=FAR_S)
+    boundaries, boundaries_found, pairs = match_boundaries(
+        example.reference.table, rows[first].table, tolerance_s=FAR_S
+    )
     marks = {
         "reference": np.delete(boundaries, [i for i, _ in pairs]),
-        first: np.delete(found, [j for _, j in pairs]),
+        first: np.delete(boundaries_found, [j for _, j in pairs]),
     }
     rows["reference"] = example.reference
     return Drawn(

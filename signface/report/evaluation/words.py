@@ -124,10 +124,10 @@ def headline(metrics: Mapping[str, Any], facts: Mapping[str, Any], vocabulary: V
             + f"the same classifier is right for {percent(other['automatic_segments']['accuracy'])} of the automatic "
             f"and {percent(other['manual_segments']['accuracy'])} of the annotator’s segments."
         )
-    own = metrics["segmentation_by_classifier"].get(best)
-    cut = own or metrics["segmentation"]
+    by_best = metrics["segmentation_by_classifier"].get(best)
+    cut = by_best or metrics["segmentation"]
     sentences.append(
-        f"Boundaries between segments, found by {'the classifier itself' if own else 'the energies'}, match the "
+        f"Boundaries between segments, found by {'the classifier itself' if by_best else 'the energies'}, match the "
         f"reference’s within 0.10 s with an F1 of {cut['boundary_f1']['0.10']:.2f}; stable or transition agree "
         f"on {percent(cut['frame_agreement'])} of the time."
     )

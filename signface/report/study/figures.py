@@ -47,8 +47,8 @@ def means_figure(responses: Responses, *, resamples: int, seed: int) -> str:
         for place, (column, name) in enumerate(questions.items(), start=1):
             axes = figure.add_subplot(1, len(questions), place)
             for row, method in enumerate(methods):
-                own = responses.table[responses.table["method"] == method]
-                mean, low, high = participant_interval(own, column, resamples=resamples, seed=seed)
+                answers = responses.table[responses.table["method"] == method]
+                mean, low, high = participant_interval(answers, column, resamples=resamples, seed=seed)
                 axes.errorbar(
                     row,
                     mean,
@@ -95,21 +95,21 @@ def differences_figure(responses: Responses, contrasts: StudyTable, models: Stud
         figure = _figure(1.9 * len(questions) + 0.085 * longest + 1.2, 0.42 * len(pairs) + 1.1)
         panels = figure.subplots(1, len(questions), squeeze=False, sharey=True)[0]
         for axes, name in zip(panels, questions.values()):
-            own = contrasts.frame[contrasts.frame["", "question"] == name]
+            of_question = contrasts.frame[contrasts.frame["", "question"] == name]
             whole = (
                 models.frame.loc[models.frame["", "question"] == name, [("mixed model", "p (Holm)")]].to_numpy().min()
             )
-            for _, contrast in own.iterrows():
+            for _, contrast in of_question.iterrows():
                 row = pairs.index(contrast["", "pair"])
                 value, low, high = (contrast["difference of means", part] for part in ("first − second", "low", "high"))
-                shown = whole < alpha and contrast["mixed model", "p (Holm)"] < alpha
+                significant = whole < alpha and contrast["mixed model", "p (Holm)"] < alpha
                 axes.errorbar(
                     value,
                     row,
                     xerr=[[max(0.0, value - low)], [max(0.0, high - value)]],
                     fmt="o",
                     color=COLOURS[0],
-                    markerfacecolor=COLOURS[0] if shown else "white",
+                    markerfacecolor=COLOURS[0] if significant else "white",
                     capsize=3.5,
                     linewidth=1.8,
                 )

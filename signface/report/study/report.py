@@ -108,7 +108,7 @@ def write_report(
             frame.to_csv(path, index=False)
         with whole_file(folder / "tables" / f"{name}.tex") as path:
             path.write_text(as_latex(table), encoding="utf-8")
-    for drawn in (figure for own in figures.values() for figure in own):
+    for drawn in (figure for section in figures.values() for figure in section):
         with whole_file(folder / "figures" / f"{drawn['name']}.svg") as path:
             path.write_text(drawn["svg"], encoding="utf-8")
     with whole_file(folder / "report.html") as path:
@@ -245,7 +245,7 @@ def _class(value: object, kind: str, alpha: float) -> str:
 
 def _figures(analysis: Analysis) -> dict[str, list[dict[str, str]]]:
     responses = analysis.responses
-    found = {
+    figures = {
         "methods": [
             {
                 "name": "means_by_method",
@@ -261,7 +261,7 @@ def _figures(analysis: Analysis) -> dict[str, list[dict[str, str]]]:
     }
     contrasts, models = analysis.table("contrasts"), analysis.table("models")
     if contrasts is not None and models is not None:
-        found["models"].append(
+        figures["models"].append(
             {
                 "name": "differences",
                 "svg": differences_figure(responses, contrasts, models, alpha=analysis.alpha),
@@ -271,7 +271,7 @@ def _figures(analysis: Analysis) -> dict[str, list[dict[str, str]]]:
         )
     matrix = confusion_figure(responses)
     if matrix:
-        found["expressions"].append(
+        figures["expressions"].append(
             {
                 "name": "confusion",
                 "svg": matrix,
@@ -279,14 +279,14 @@ def _figures(analysis: Analysis) -> dict[str, list[dict[str, str]]]:
                 "named each expression.",
             }
         )
-    found["expressions"].append(
+    figures["expressions"].append(
         {
             "name": "means_by_expression",
             "svg": expressions_figure(responses),
             "caption": "Means by played expression and method.",
         }
     )
-    return found
+    return figures
 
 
 def _pictures(folder: str | PathLike[str] | None) -> list[tuple[str, str]]:

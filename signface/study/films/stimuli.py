@@ -219,7 +219,7 @@ def read_excerpts(file: Path) -> dict[str, Excerpt]:
         raise SignfaceError(
             "no such file", file=file, hint="it has the columns excerpt, take, start_s, end_s, one row per excerpt"
         )
-    found = {}
+    excerpts = {}
     with open(file, newline="", encoding="utf-8-sig") as lines:
         for number, row in enumerate(csv.DictReader(lines), start=2):
             try:
@@ -231,10 +231,10 @@ def read_excerpts(file: Path) -> dict[str, Excerpt]:
                 ) from error
             if not times[0] < times[1]:
                 raise SignfaceError(f"line {number}: the excerpt ends before it begins", file=file)
-            if excerpt.name in found:
+            if excerpt.name in excerpts:
                 raise SignfaceError(f"line {number}: the excerpt {excerpt.name} is named twice", file=file)
-            found[excerpt.name] = excerpt
-    return found
+            excerpts[excerpt.name] = excerpt
+    return excerpts
 
 
 def _look(folder: Path, name: str, row: Mapping) -> Look:

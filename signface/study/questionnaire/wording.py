@@ -16,7 +16,7 @@ def shipped_words() -> dict[str, dict[str, str]]:
     return tomllib.loads((Path(__file__).parent / "pages" / "words.toml").read_text(encoding="utf-8"))
 
 
-def wording(language: str, own: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
+def wording(language: str, changed: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
     """The words of one language: those that ship, replaced or completed by a study's `[words.LANGUAGE]`.
 
     Raises
@@ -25,7 +25,7 @@ def wording(language: str, own: Mapping[str, Mapping[str, str]]) -> dict[str, st
         The language does not ship and the study does not give all of its words.
     """
     shipped = shipped_words()
-    words = {**shipped.get(language, {}), **own.get(language, {})}
+    words = {**shipped.get(language, {}), **changed.get(language, {})}
     missing = [key for key in shipped["en"] if key not in words]
     if missing:
         raise SignfaceError(

@@ -38,26 +38,26 @@ def findings(
         As made by their modules.
     alpha : float
     """
-    said = []
+    sentences = []
     corrected = holm([comparison.likelihood_ratio.p for comparison in comparisons.values()])
     for row, (column, comparison) in enumerate(comparisons.items()):
         name = responses.questions[column]
         thesis = hypotheses.frame.iloc[row]
         model_p = float(corrected[row])
         if math.isnan(thesis["p"]):
-            said.append(f"{name.capitalize()}: nothing can be tested ({thesis['conditions not met']}).")
+            sentences.append(f"{name.capitalize()}: nothing can be tested ({thesis['conditions not met']}).")
             continue
         test = f"{thesis['test']}: {write_p(thesis['p (Holm)'])}, {thesis['effect']}, {thesis['size']}"
         if math.isnan(model_p):
-            shown = thesis["p (Holm)"] < alpha
-            verb = "the methods differ" if shown else "no difference between the methods is shown"
-            said.append(f"{name.capitalize()}: {verb} ({test}); there are too few participants for a model.")
+            significant = thesis["p (Holm)"] < alpha
+            verb = "the methods differ" if significant else "no difference between the methods is shown"
+            sentences.append(f"{name.capitalize()}: {verb} ({test}); there are too few participants for a model.")
             continue
-        own = contrasts.frame[contrasts.frame[("", "question")] == name]
+        of_question = contrasts.frame[contrasts.frame[("", "question")] == name]
         pairs = list(combinations(comparison.methods, 2))
         differing = [
             _difference(pair, contrast)
-            for pair, (_, contrast) in zip(pairs, own.iterrows())
+            for pair, (_, contrast) in zip(pairs, of_question.iterrows())
             if contrast["mixed model", "p (Holm)"] < alpha
         ]
         model = f"mixed model: {write_p(model_p)}"
@@ -71,8 +71,8 @@ def findings(
             sentence = f"{name.capitalize()}: no difference between the methods is shown ({test}; {model}).{missed}"
         if (thesis["p (Holm)"] < alpha) != (model_p < alpha):
             sentence += " The two disagree: the test takes a participant's answers as independent, the model does not."
-        said.append(sentence)
-    return tuple(said)
+        sentences.append(sentence)
+    return tuple(sentences)
 
 
 def _difference(pair: tuple[str, str], contrast) -> str:  # type: ignore[no-untyped-def]  # a row of a data frame

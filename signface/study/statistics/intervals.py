@@ -75,10 +75,10 @@ def difference_intervals(
         with np.errstate(invalid="ignore", divide="ignore"):
             means[method] = (weights @ each["sum"].to_numpy()) / (weights @ each["size"].to_numpy())
             whole[method] = np.float64(each["sum"].sum()) / np.float64(each["size"].sum())
-    tail, found = 50 * (1 - level), {}
+    tail, intervals = 50 * (1 - level), {}
     for first, second in combinations(methods, 2):
         differences = means[first] - means[second]
         differences = differences[np.isfinite(differences)]
         low, high = np.percentile(differences, [tail, 100 - tail]) if len(differences) else (np.nan, np.nan)
-        found[first, second] = (float(whole[first] - whole[second]), float(low), float(high))
-    return found
+        intervals[first, second] = (float(whole[first] - whole[second]), float(low), float(high))
+    return intervals

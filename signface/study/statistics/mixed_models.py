@@ -118,9 +118,11 @@ class OrdinalMixedModel:
             ]
         )
         self._modes = np.zeros(self._levels.size)
-        found = minimize(self._negative, start, jac=True, method="BFGS", options={"gtol": 1e-4, "maxiter": MOST_STEPS})
-        information = self._information(found.x)
-        gradient = np.abs(self._negative(found.x)[1]).max()
+        optimum = minimize(
+            self._negative, start, jac=True, method="BFGS", options={"gtol": 1e-4, "maxiter": MOST_STEPS}
+        )
+        information = self._information(optimum.x)
+        gradient = np.abs(self._negative(optimum.x)[1]).max()
         try:
             covariance = np.linalg.inv(information)
         except np.linalg.LinAlgError:
@@ -128,12 +130,12 @@ class OrdinalMixedModel:
         cuts, width = self._cuts, self._fixed.shape[1]
         part = slice(cuts, cuts + width)
         return OrdinalFit(
-            self._thresholds(found.x[:cuts]),
-            found.x[part],
+            self._thresholds(optimum.x[:cuts]),
+            optimum.x[part],
             np.asarray(covariance[part, part], float),
-            np.abs(found.x[cuts + width :]).astype(float),
-            -float(found.fun),
-            bool(gradient < 1e-2 and np.isfinite(found.fun)),
+            np.abs(optimum.x[cuts + width :]).astype(float),
+            -float(optimum.fun),
+            bool(gradient < 1e-2 and np.isfinite(optimum.fun)),
         )
 
     def _information(self, point: Array) -> Array:
@@ -192,8 +194,8 @@ class OrdinalMixedModel:
         score, trace = levels.gather(curves.eta), hessian.trace()
         gradient_spread = np.zeros(levels.groups)
         for group, column in enumerate(levels.columns.T):
-            own = np.unique(column)
-            gradient_spread[group] = by_eta @ modes[column] - trace[own].sum() - along[own] @ score[own]
+            distinct = np.unique(column)
+            gradient_spread[group] = by_eta @ modes[column] - trace[distinct].sum() - along[distinct] @ score[distinct]
         gradient = np.concatenate([gradient_theta, gradient_fixed, gradient_spread])
         if not np.isfinite(value):
             return 1e10, np.zeros_like(gradient)

@@ -194,30 +194,34 @@ def models_table(responses: Responses, comparisons: dict[str, MethodComparison])
     """The three comparisons of every question, with the spread of the random effects."""
     import pandas as pd
 
-    mixed = holm([found.likelihood_ratio.p for found in comparisons.values()])
+    mixed = holm([comparison.likelihood_ratio.p for comparison in comparisons.values()])
     rows: list[dict[tuple[str, str], object]] = []
     notes: list[str] = []
-    for (column, found), corrected in zip(comparisons.items(), mixed):
+    for (column, comparison), corrected in zip(comparisons.items(), mixed):
         name = responses.questions[column]
-        over = found.over_participants
+        over = comparison.over_participants
         rows.append(
             {
                 ("", "question"): name,
-                ("mixed model", "χ²"): found.likelihood_ratio.statistic,
-                ("mixed model", "df"): _or_nan(found.likelihood_ratio.df),
-                ("mixed model", "p"): found.likelihood_ratio.p,
+                ("mixed model", "χ²"): comparison.likelihood_ratio.statistic,
+                ("mixed model", "df"): _or_nan(comparison.likelihood_ratio.df),
+                ("mixed model", "p"): comparison.likelihood_ratio.p,
                 ("mixed model", "p (Holm)"): float(corrected),
-                ("spread, logits", "participants"): found.spreads.get("participants", math.nan),
-                ("spread, logits", "reactions"): found.spreads.get("reactions", math.nan),
-                ("spread, logits", "stimuli"): found.spreads.get("stimuli", math.nan),
-                ("population-averaged", "Wald"): found.averaged.statistic,
-                ("population-averaged", "p"): found.averaged.p,
+                ("spread, logits", "participants"): comparison.spreads.get("participants", math.nan),
+                ("spread, logits", "reactions"): comparison.spreads.get("reactions", math.nan),
+                ("spread, logits", "stimuli"): comparison.spreads.get("stimuli", math.nan),
+                ("population-averaged", "Wald"): comparison.averaged.statistic,
+                ("population-averaged", "p"): comparison.averaged.p,
                 ("over participants", "test"): over.test,
                 ("over participants", "statistic"): over.statistic,
                 ("over participants", "p"): over.p,
             }
         )
-        for what, result in (("mixed model", found.likelihood_ratio), ("GEE", found.averaged), (over.test, over)):
+        for what, result in (
+            ("mixed model", comparison.likelihood_ratio),
+            ("GEE", comparison.averaged),
+            (over.test, over),
+        ):
             notes += [f"{name}, {what}: {reason}." for reason in result.violated]
     kinds: dict[str | tuple[str, str], str] = {
         ("mixed model", "χ²"): "statistic",
@@ -259,18 +263,18 @@ def contrasts_table(
     from scipy import stats
 
     rows = []
-    for column, found in comparisons.items():
-        intervals = difference_intervals(responses.table, column, found.methods, resamples=resamples, seed=seed)
+    for column, comparison in comparisons.items():
+        intervals = difference_intervals(responses.table, column, comparison.methods, resamples=resamples, seed=seed)
         means = participant_means(responses, column)
-        pairs = list(combinations(found.methods, 2))
+        pairs = list(combinations(comparison.methods, 2))
         odds, model_p, people = {}, [], []
         for first, second in pairs:
             ratio, p = "–", math.nan
-            if found.mixed is not None:
-                weights = [float(method == first) - float(method == second) for method in found.methods[1:]]
-                value, error = found.mixed.contrast(weights)
+            if comparison.mixed is not None:
+                weights = [float(method == first) - float(method == second) for method in comparison.methods[1:]]
+                value, error = comparison.mixed.contrast(weights)
                 if error > 0 and np.isfinite(error):
-                    around = stats.t(freedom(len(means), len(found.methods)))
+                    around = stats.t(freedom(len(means), len(comparison.methods)))
                     p = float(2 * around.sf(abs(value / error)))
                     low, high = np.exp(value + around.ppf([0.025, 0.975]) * error)
                     ratio = f"{np.exp(value):.2f} [{low:.2f}, {high:.2f}]"
@@ -324,14 +328,14 @@ def posthoc_table(responses: Responses) -> StudyTable:
             continue
         if column == "correct":
             pairs = paired(responses, column)
-            found = {(first, second): mcnemar(pairs[first], pairs[second]) for first, second in combinations(names, 2)}
+            tests = {(first, second): mcnemar(pairs[first], pairs[second]) for first, second in combinations(names, 2)}
             whole = cochran(pairs[names].to_numpy())
             if len(names) > 2:
                 rows.append({"question": name, "pair": "all methods"} | result_cells(whole, math.nan))
         else:
             results = dunn([group for _, group in asked])
-            found = {(names[i], names[j]): result for (i, j), result in results.items()}
-        for ((first, second), result), p in zip(found.items(), holm([result.p for result in found.values()])):
+            tests = {(names[i], names[j]): result for (i, j), result in results.items()}
+        for ((first, second), result), p in zip(tests.items(), holm([result.p for result in tests.values()])):
             rows.append({"question": name, "pair": f"{first} – {second}"} | result_cells(result, float(p)))
     return StudyTable(
         "posthoc",

@@ -53,7 +53,7 @@ def influence_results(responses: Responses) -> list[Influence]:
     Accuracy with age and habit: Spearman on the participants' mean accuracy. Accuracy with other factors: χ².
     Scales with age, habit and played intensity: Spearman. Scales with other factors: Kruskal and Wallis.
     """
-    found = []
+    influences = []
     factors = [factor for factor in (*PERSONAL, "intensity", "expression") if factor in responses.factors()]
     for question in responses.questions:
         for factor in factors:
@@ -72,8 +72,8 @@ def influence_results(responses: Responses) -> list[Influence]:
                 result = spearman(table[factor].astype(float), table[question], persons=persons)
             else:
                 result = kruskal_wallis([group[question] for _, group in table.groupby(factor)])
-            found.append(Influence(question, factor, result, over))
-    return found
+            influences.append(Influence(question, factor, result, over))
+    return influences
 
 
 def influence_table(responses: Responses, results: list[Influence]) -> StudyTable:
@@ -84,10 +84,10 @@ def influence_table(responses: Responses, results: list[Influence]) -> StudyTabl
     kinds: dict[str | tuple[str, str], str] = {}
     for question, name in responses.questions.items():
         row: dict[tuple[str, str], object] = {("", "question"): name}
-        for found in results:
-            if found.question == question:
-                title, result = FACTORS[found.factor], found.result
-                marked = question == "correct" and found.factor in ("age", "avatar_habit")
+        for influence in results:
+            if influence.question == question:
+                title, result = FACTORS[influence.factor], influence.result
+                marked = question == "correct" and influence.factor in ("age", "avatar_habit")
                 row[title, "statistic"] = (
                     "–"
                     if math.isnan(result.statistic)
@@ -115,12 +115,12 @@ def influence_details(responses: Responses, results: list[Influence]) -> StudyTa
     """One row per test of `influence_table`, with effect sizes, corrections, conditions, and p over participants."""
     import pandas as pd
 
-    corrected = holm([found.result.p for found in results])
+    corrected = holm([influence.result.p for influence in results])
     rows = [
-        {"question": responses.questions[found.question], "factor": FACTORS[found.factor]}
-        | result_cells(found.result, float(p))
-        | {"p over participants": math.nan if found.over_participants is None else found.over_participants.p}
-        for found, p in zip(results, corrected)
+        {"question": responses.questions[influence.question], "factor": FACTORS[influence.factor]}
+        | result_cells(influence.result, float(p))
+        | {"p over participants": math.nan if influence.over_participants is None else influence.over_participants.p}
+        for influence, p in zip(results, corrected)
     ]
     return StudyTable(
         "influence_details",
@@ -136,32 +136,32 @@ def remarks_table(responses: Responses, results: list[Influence], *, alpha: floa
     """What is significant, in words, and the reasons to doubt it (form of tables A.1 and A.7)."""
     import pandas as pd
 
-    corrected = holm([found.result.p for found in results])
+    corrected = holm([influence.result.p for influence in results])
     rows = []
-    for found, p in zip(results, corrected):
-        if found.result.p < alpha and found.factor in (*PERSONAL, "intensity"):
-            doubts = _doubts(responses, found, float(p), alpha)
-            rows.append({"remark": _sentence(responses, found), "doubts": "; ".join(doubts) or "none"})
+    for influence, p in zip(results, corrected):
+        if influence.result.p < alpha and influence.factor in (*PERSONAL, "intensity"):
+            doubts = _doubts(responses, influence, float(p), alpha)
+            rows.append({"remark": _sentence(responses, influence), "doubts": "; ".join(doubts) or "none"})
     frame = pd.DataFrame(rows or [{"remark": f"Nothing is significant at {alpha:g}.", "doubts": "none"}])
     return StudyTable("remarks", "Remarks about the participants and the played intensity", frame, reference="A.1, A.7")
 
 
-def _sentence(responses: Responses, found: Influence) -> str:
-    name, factor = responses.questions[found.question], FACTORS[found.factor]
-    table = responses.table.dropna(subset=[found.question, found.factor])
-    p = write_p(found.result.p)
-    if found.result.symbol == "ρ":
-        way = "rises" if found.result.effect > 0 else "falls"
-        return f"{name.capitalize()} {way} with {factor} (ρ = {write_cell(found.result.effect, 'effect')}, {p})"
-    means = table.groupby(found.factor)[found.question].mean().sort_values(ascending=False)
+def _sentence(responses: Responses, influence: Influence) -> str:
+    name, factor = responses.questions[influence.question], FACTORS[influence.factor]
+    table = responses.table.dropna(subset=[influence.question, influence.factor])
+    p = write_p(influence.result.p)
+    if influence.result.symbol == "ρ":
+        way = "rises" if influence.result.effect > 0 else "falls"
+        return f"{name.capitalize()} {way} with {factor} (ρ = {write_cell(influence.result.effect, 'effect')}, {p})"
+    means = table.groupby(influence.factor)[influence.question].mean().sort_values(ascending=False)
     listed = ", ".join(
         f"{level:g} {mean:.2f}" if isinstance(level, float) else f"{level} {mean:.2f}" for level, mean in means.items()
     )
     return f"{name.capitalize()} differs with {factor} (means: {listed}; {p})"
 
 
-def _doubts(responses: Responses, found: Influence, corrected: float, alpha: float) -> list[str]:
-    result, doubts = found.result, []
+def _doubts(responses: Responses, influence: Influence, corrected: float, alpha: float) -> list[str]:
+    result, doubts = influence.result, []
     if result.p > 0.8 * alpha:
         doubts.append("p is close to the limit")
     if result.symbol == "ρ" and abs(result.effect) < 0.1:
@@ -169,16 +169,16 @@ def _doubts(responses: Responses, found: Influence, corrected: float, alpha: flo
     if corrected >= alpha:
         doubts.append(f"not significant with Holm's correction ({write_p(corrected)})")
     if (
-        found.over_participants is not None
-        and found.over_participants is not result
-        and not found.over_participants.p < alpha
+        influence.over_participants is not None
+        and influence.over_participants is not result
+        and not influence.over_participants.p < alpha
     ):
-        doubts.append(f"not significant with one value per participant ({write_p(found.over_participants.p)})")
-    if found.factor in PERSONAL:
-        shares = responses.people()[found.factor].value_counts()
-        if found.factor in ORDERED and shares.iloc[0] > shares.sum() / 2:
+        doubts.append(f"not significant with one value per participant ({write_p(influence.over_participants.p)})")
+    if influence.factor in PERSONAL:
+        shares = responses.people()[influence.factor].value_counts()
+        if influence.factor in ORDERED and shares.iloc[0] > shares.sum() / 2:
             doubts.append(f"{shares.iloc[0]} of {shares.sum()} participants have one value ({shares.index[0]:g})")
-        elif found.factor not in ORDERED and shares.iloc[-1] < 5:
+        elif influence.factor not in ORDERED and shares.iloc[-1] < 5:
             doubts.append(f"only {shares.iloc[-1]} participants are {shares.index[-1]}")
     return [*doubts, *result.violated]
 

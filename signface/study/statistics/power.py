@@ -65,8 +65,8 @@ def participants_needed(difference: float, spread: float, *, alpha: float = 0.05
     effect = difference / spread
     if effect > 3:  # the solver has no root there; three participants with differences that large are enough
         return 3
-    found = solver.solve_power(effect_size=effect, nobs=None, alpha=alpha, power=power)
-    return max(3, math.ceil(float(found) / EFFICIENCY))
+    pairs_needed = solver.solve_power(effect_size=effect, nobs=None, alpha=alpha, power=power)
+    return max(3, math.ceil(float(pairs_needed) / EFFICIENCY))
 
 
 def power_table(responses: Responses, *, alpha: float = 0.05) -> StudyTable:

@@ -179,8 +179,8 @@ class Hessian:
     def trace(self) -> Array:
         """The diagonal of H⁻¹ΛZ'WZ, (size,): what ½log|H| gains by each slot's spread."""
         core, cross, edge = self._inverse()
-        own = np.einsum("ckj,cj,cjk->ck", core, self._core_scale, self._inner)
-        own += np.einsum("cki,i,cki->ck", cross, self._edge_scale, self._across)
+        inner = np.einsum("ckj,cj,cjk->ck", core, self._core_scale, self._inner)
+        inner += np.einsum("cki,i,cki->ck", cross, self._edge_scale, self._across)
         outer = np.einsum("cji,cj,cji->i", cross, self._core_scale, self._across)
         outer += np.einsum("ij,j,ji->i", edge, self._edge_scale, self._outside)
-        return np.concatenate([own.ravel(), outer])
+        return np.concatenate([inner.ravel(), outer])

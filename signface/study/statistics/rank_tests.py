@@ -297,15 +297,15 @@ def dunn(groups: Sequence[ArrayLike]) -> dict[tuple[int, int], TestResult]:
     together = np.concatenate(arrays)
     variance = stats.rankdata(together).var(ddof=1) if len(together) > 1 else 0.0
     ranks = np.split(stats.rankdata(together), np.cumsum([len(values) for values in arrays])[:-1])
-    found = {}
+    results = {}
     for i, j in combinations(range(len(arrays)), 2):
         n = len(arrays[i]) + len(arrays[j])
         if variance == 0 or not len(arrays[i]) or not len(arrays[j]):
-            found[i, j] = untestable("Dunn", "z", n, "constant answers", effect_name="rank_biserial")
+            results[i, j] = untestable("Dunn", "z", n, "constant answers", effect_name="rank_biserial")
             continue
         z = (ranks[i].mean() - ranks[j].mean()) / math.sqrt(variance * (1 / len(arrays[i]) + 1 / len(arrays[j])))
         above = stats.mannwhitneyu(arrays[i], arrays[j]).statistic / (len(arrays[i]) * len(arrays[j]))
-        found[i, j] = TestResult(
+        results[i, j] = TestResult(
             "Dunn", "z", float(z), float(2 * stats.norm.sf(abs(z))), n, None, "rank_biserial", float(2 * above - 1)
         )
-    return found
+    return results

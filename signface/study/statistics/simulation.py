@@ -241,10 +241,10 @@ def simulate(
         for question in QUESTIONS:
             if question not in design.questions:
                 continue
-            own = rng.normal(0, effects.participants)
+            participant_shift = rng.normal(0, effects.participants)
             reactions = rng.normal(0, effects.reactions, len(methods)) if effects.reactions else np.zeros(len(methods))
             shift = np.array([effects.of(method, question) for method in methods]) + reactions
-            level = own + shift[method_place[block.index]]
+            level = participant_shift + shift[method_place[block.index]]
             if question == "correct":
                 block["answer_expression"] = _recognise(block["expression"].tolist(), level, labels, rng)
             else:
@@ -260,8 +260,8 @@ def simulate(
 
 def _recognise(played: list[str], level: np.ndarray, labels: list[str], rng: np.random.Generator) -> list[str]:
     answers = []
-    for expression, own in zip(played, level):
-        probability = 1 / (1 + np.exp(-(_RECOGNISED.get(expression, 0.5) + own)))
+    for expression, shift in zip(played, level):
+        probability = 1 / (1 + np.exp(-(_RECOGNISED.get(expression, 0.5) + shift)))
         wrong = [label for label in labels if label != expression]
         if rng.random() < probability or not wrong:
             answers.append(expression)

@@ -137,15 +137,15 @@ def paired(responses: Responses, column: str) -> pd.DataFrame:
 
 def pairwise_results(responses: Responses, column: str) -> dict[tuple[str, str], TestResult]:
     """The thesis's test of every pair of methods: χ² with Yates for accuracy, Wilcoxon on pairs for scales."""
-    table, found = responses.table, {}
+    table, results = responses.table, {}
     pairs = paired(responses, column)
     for first, second in combinations(responses.methods, 2):
         if column == "correct":
-            found[first, second] = chi_square(right_and_wrong(table[table["method"].isin([first, second])], "method"))
+            results[first, second] = chi_square(right_and_wrong(table[table["method"].isin([first, second])], "method"))
         else:
             nothing = pairs.iloc[:0].reindex(columns=[first, second]) if not {first, second} <= set(pairs) else pairs
-            found[first, second] = wilcoxon(nothing[first], nothing[second])
-    return found
+            results[first, second] = wilcoxon(nothing[first], nothing[second])
+    return results
 
 
 def pairwise_table(responses: Responses) -> StudyTable:
@@ -238,9 +238,9 @@ def expression_means(responses: Responses, *, by_method: bool = False) -> StudyT
     for column, name in responses.questions.items():
         means = responses.table.groupby(groups)[column].mean()
         for method in responses.methods if by_method else [None]:
-            found = means.get(method, pd.Series(dtype=float)) if by_method else means
+            of_method = means.get(method, pd.Series(dtype=float)) if by_method else means
             row = {"question": name} | ({"method": method} if by_method else {})
-            rows.append(row | {name: float(found.get(name, math.nan)) for name in responses.expressions})
+            rows.append(row | {name: float(of_method.get(name, math.nan)) for name in responses.expressions})
     if by_method:
         return StudyTable("means_by_method_and_expression", "Means by method and played expression", pd.DataFrame(rows))
     return StudyTable("means_by_expression", "Means by played expression", pd.DataFrame(rows), reference="A.3, A.6")
@@ -253,23 +253,25 @@ def confusions(responses: Responses) -> dict[str, pd.DataFrame]:
     answered = responses.table.dropna(subset=["answer_expression"])
     labels = order_expressions(sorted({*answered["expression"], *answered["answer_expression"]}))
     played = [label for label in labels if label in set(answered["expression"])]
-    found = {}
+    matrices = {}
     for method in sorted(answered["method"].unique()):
-        own = answered[answered["method"] == method]
-        found[method] = pd.crosstab(own["expression"], own["answer_expression"]).reindex(
+        of_method = answered[answered["method"] == method]
+        matrices[method] = pd.crosstab(of_method["expression"], of_method["answer_expression"]).reindex(
             index=played, columns=labels, fill_value=0
         )
-    return found
+    return matrices
 
 
 def confusion_tables(responses: Responses) -> list[StudyTable]:
     """The confusion matrix of each method as a table of counts."""
-    found = []
+    tables = []
     for method, counts in confusions(responses).items():
         frame = counts.rename_axis(None, axis=1).rename_axis("played").reset_index()
         kinds: dict[str | tuple[str, str], str] = dict.fromkeys(counts.columns, "count")
-        found.append(StudyTable(f"confusion_{method}", f"Confusion matrix, {method}", frame, kinds, "figures 6.3, 6.6"))
-    return found
+        tables.append(
+            StudyTable(f"confusion_{method}", f"Confusion matrix, {method}", frame, kinds, "figures 6.3, 6.6")
+        )
+    return tables
 
 
 def participant_means(responses: Responses, column: str) -> pd.DataFrame:
