@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,7 @@ from signface.progress import progress
 from signface.settings.solve import SolveSettings
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 EXAMPLE = """  signface elan check corrected/*.eaf
   signface elan map lab.etf -o mapping.toml
@@ -136,87 +137,50 @@ def map_template(arguments: argparse.Namespace) -> None:
 
 def learn_corrections(arguments: argparse.Namespace) -> None:
     """Show the corrections, compare before and after on takes held out, train on all and save."""
-    import pandas as pd
-
     from signface.corpus.examples import solve_examples
     from signface.corpus.manifest import read_corpus
-    from signface.elan.reference import read_corrections
-    from signface.evaluation.corrections import changes, summarise_changes
+    from signface.elan.reference import corpus_corrections
+    from signface.evaluation.corrections import compare_corrections
+    from signface.label.persistence import load_model, read_card, save_model
 
+    card = read_card(arguments.before)
+    vocabulary = card.vocabulary.without_blank()
     corpus = read_corpus(arguments.corpus)
-    annotated = [(entry.annotation, entry.signer) for entry in corpus if entry.annotation is not None]
-    found, total, unknown = [], 0, 0
-    for annotation, signer in annotated:
-        tables = read_corrections(annotation, signer)
-        if tables is None:
-            unknown += 1
-            continue
-        found.append(changes(*tables))
-        total += len(tables[0])
-    if unknown:
-        print(
-            f"{unknown} of {len(annotated)} annotations were not written by signface: they are learnt from as they are"
-        )
-    if found:
-        print("\n".join(summarise_changes(pd.concat(found, ignore_index=True), total)))
+    files = [(entry.annotation, entry.signer) for entry in corpus if entry.annotation is not None]
+    tables = corpus_corrections(files, tier=card.tier, vocabulary=vocabulary)
+    for line in compare_corrections(tables):
+        print(line)
     if arguments.output is None:
         return
     if arguments.output.suffix.lower() != ".skops":
         raise SignfaceError("the ending of a classifier is .skops", file=arguments.output)
 
-    from signface.label.persistence import load_model, save_model
-    from signface.learn.relearning import held_out_labels
-    from signface.learn.training import train_model
+    from signface.learn.relearning import learn_corrections
     from signface.settings.training import TrainingSettings
 
-    def solved(folder: Path) -> list:
-        own = read_corpus(folder)
-        count = sum(entry.annotation is not None for entry in own)
-        return solve_examples(own, settings=solve, progress=lambda items: progress(items, "solving", total=count))
-
-    settings = TrainingSettings(classifier=arguments.classifier, seed=arguments.seed, calibrate=False)
     solve = settings_from(arguments, SolveSettings)
-    before = load_model(arguments.before)
-    corrected = solved(arguments.corpus)
-    known_names = {example.take.rpartition("/")[2] for example in corrected}
-    others = [example for folder in arguments.others for example in solved(folder)]
-    apart = [example for example in others if example.take.rpartition("/")[2] not in known_names]
-    if len(apart) < len(others):  # a take held out must not be learnt from by another road
-        print(f"{len(others) - len(apart)} takes of the same name in --with are left out")
-    others = apart
-    scores = {}
-    if len(corrected) > 1:
-        labels = held_out_labels(corrected, before, settings, others=others)
-        print(_before_and_after(labels, before.name))
-        scores = {"accuracy on corrected takes held out": float((labels["after"] == labels["label"]).mean())}
-        if (labels["after"] == labels["label"]).mean() < (labels["before"] == labels["label"]).mean():
-            print(f"the new classifier does worse: stay with {before.name}, or learn from more takes (--with)")
-        known = {example.take for example in corrected} & set(before.card.takes)
-        if known:
-            print(f"{before.name} was trained on {len(known)} of these takes: its accuracy flatters it")
-    else:
-        print("one take cannot be held out of itself: no comparison")
-    model = train_model(
-        [*corrected, *others],
-        settings,
+
+    def solved(folder: Path) -> list:
+        takes = read_corpus(folder)
+        count = sum(entry.annotation is not None for entry in takes)
+        shown = partial(progress, what="solving", total=count)
+        sparse = not card.vocabulary.blank
+        return solve_examples(
+            takes, settings=solve, tier=card.tier, vocabulary=vocabulary, sparse=sparse, progress=shown
+        )
+
+    learnt = learn_corrections(
+        solved(arguments.corpus),
+        load_model(arguments.before),
+        TrainingSettings(classifier=arguments.classifier, seed=arguments.seed, calibrate=False),
+        others=[example for folder in arguments.others for example in solved(folder)],
         solve=solve,
         corpus=" + ".join(folder.resolve().name for folder in (arguments.corpus, *arguments.others)),
-        scores=scores,
         name=arguments.output.stem,
     )
-    save_model(model, arguments.output)
-    print(f"{arguments.output}: {model.card.classifier} trained on {len(model.card.takes)} takes")
-
-
-def _before_and_after(labels: pd.DataFrame, name: str) -> str:
-    """A small table: accuracy on the stable segments of takes held out, before and after."""
-    before, after = (labels[column] == labels["label"] for column in ("before", "after"))
-    lines = [
-        f"stable segments of takes held out: {len(labels)} in {labels['take'].nunique()} takes",
-        f"  before ({name}): {before.mean():.2f} right",
-        f"  after: {after.mean():.2f} right ({(after & ~before).sum()} better, {(before & ~after).sum()} worse)",
-    ]
-    return "\n".join(lines)
+    print("\n".join(learnt.words))
+    save_model(learnt.model, arguments.output)
+    print(f"{arguments.output}: {learnt.model.card.classifier} trained on {len(learnt.model.card.takes)} takes")
 
 
 def compare_annotators(arguments: argparse.Namespace) -> None:

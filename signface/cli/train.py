@@ -114,7 +114,7 @@ def run(arguments: argparse.Namespace) -> None:
     from signface.corpus.examples import solve_examples
     from signface.corpus.manifest import read_corpus
     from signface.label.persistence import save_model
-    from signface.learn.training import train_model
+    from signface.learn.training import train_each, train_model
 
     output = arguments.output
     if output.suffix.lower() != ".skops":
@@ -136,20 +136,10 @@ def run(arguments: argparse.Namespace) -> None:
         **tier_options(arguments),
         progress=lambda items: progress(items, "solving", total=annotated),
     )
-    groups = {output: examples}
-    if arguments.signer == "each":
-        groups = {
-            output.with_name(f"{output.stem}-{signer}{output.suffix}"): [e for e in examples if e.signer == signer]
-            for signer in sorted({example.signer for example in examples})
-        }
-    for file, group in groups.items():
-        model = train_model(
-            group,
-            settings,
-            solve=solve,
-            corpus=whole.folder.resolve().name,
-            name=file.stem,
-        )
+    train = train_each if arguments.signer == "each" else train_model
+    trained = train(examples, settings, solve=solve, corpus=whole.folder.resolve().name, name=output.stem)
+    for model in trained.values() if isinstance(trained, dict) else [trained]:
+        file = output.with_name(f"{model.name}{output.suffix}")
         save_model(model, file)
         card = model.card
         print(

@@ -203,6 +203,16 @@ def read_corrections(
     return before, after
 
 
+def corpus_corrections(
+    files: Sequence[tuple[str | PathLike[str], str | None]],
+    *,
+    tier: str = "affect",
+    vocabulary: Vocabulary | None = None,
+) -> list[tuple[pd.DataFrame, pd.DataFrame] | None]:
+    """`read_corrections` of each annotation of a corpus, with its signer."""
+    return [read_corrections(file, signer, tier=tier, vocabulary=vocabulary) for file, signer in files]
+
+
 def channel_labels(root: etree._Element) -> dict[str, tuple[str, dict[str, str]]]:
     """For each of a lab's tiers that signface wrote to: the channel, and our label for each of the lab's values."""
     labels_of = {}
@@ -243,7 +253,7 @@ def _checked_rows(
                 f"label {label!r} on tier {name} at {start / 1000:.3f} s is not in the vocabulary",
                 file=file,
                 hint=f"stable labels are {', '.join(vocabulary.values)}"
-                + ("; transitions join two of them, as NA" if vocabulary is AFFECT else ""),
+                + ("; transitions join two of them, as NA" if vocabulary == AFFECT else ""),
             )
         if rows and start < rows[-1][1]:
             raise SignfaceError(f"annotations on tier {name} overlap at {start / 1000:.3f} s", file=file)

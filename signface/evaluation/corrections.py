@@ -1,12 +1,14 @@
 """What an annotator changed in the machine's annotation, on plain tables.
 
 - `changes`: one row for each annotation that was moved, renamed, added or removed.
-- `summarise_changes`: the rows in plain words.
+- `summarise_changes`: the rows in plain words; `compare_corrections`: of the annotations of a corpus.
 
 A table has the columns `start_s, end_s, label`, in order of time, without overlap.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import pandas as pd
 
@@ -80,4 +82,25 @@ def summarise_changes(table: pd.DataFrame, annotations: int) -> list[str]:
         count = int((table["change"] == what).sum()) if len(table) else 0
         if count:
             lines.append(f"  {what}: {count}")
+    return lines
+
+
+def compare_corrections(tables: Sequence[tuple[pd.DataFrame, pd.DataFrame] | None]) -> list[str]:
+    """Lines that say what annotators changed in a corpus.
+
+    Parameters
+    ----------
+    tables : sequence of pairs of DataFrame, or None
+        For each annotation, before and after; None for those that signface did not write.
+    """
+    known = [pair for pair in tables if pair is not None]
+    lines = []
+    if len(known) < len(tables):
+        lines.append(
+            f"{len(tables) - len(known)} of {len(tables)} annotations were not written by signface: they are learnt "
+            "from as they are"
+        )
+    if known:
+        changed = pd.concat([changes(*pair) for pair in known], ignore_index=True)
+        lines += summarise_changes(changed, sum(len(before) for before, _ in known))
     return lines

@@ -282,6 +282,16 @@ class Vocabulary:
         distinct = {str(label) for label in labels}
         return AFFECT if distinct <= set(AFFECT.allowed) else cls(name, tuple(sorted(distinct)))
 
+    def without_blank(self) -> Vocabulary:
+        """The vocabulary of what stands in annotations; the inverse of `with_blank`."""
+        return replace(
+            self,
+            values=tuple(value for value in self.values if value != self.blank),
+            descriptions={value: words for value, words in self.descriptions.items() if value != self.blank},
+            colours={value: colour for value, colour in self.colours.items() if value != self.blank},
+            blank="",
+        )
+
     def coloured(self) -> Vocabulary:
         """The vocabulary in which every value has its colour of `palette`."""
         return replace(self, colours=self.palette)

@@ -1,11 +1,13 @@
 """Learning from corrections: what a model did before, and what one trained on the corrections does, on takes held out.
 
+- `learn_corrections`: a model trained on corrected takes, and how it compares with the one before.
 - `held_out_labels`: the labels that both give to the stable segments of takes that neither has seen.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -15,7 +17,77 @@ from signface.label.labelling import label_spans
 from signface.label.model import TrainedModel
 from signface.learn.examples import Example, in_order
 from signface.learn.training import train_model
+from signface.settings.solve import SolveSettings
 from signface.settings.training import TrainingSettings
+
+
+class Relearnt(NamedTuple):
+    """A model trained on corrections.
+
+    Parameters
+    ----------
+    model : TrainedModel
+    labels : DataFrame or None
+        What `held_out_labels` gives; None with one take, which cannot be held out.
+    words : list of str
+        How the model compares with the one before, in lines for people.
+    """
+
+    model: TrainedModel
+    labels: pd.DataFrame | None
+    words: list[str]
+
+
+def learn_corrections(
+    corrected: Sequence[Example],
+    before: TrainedModel,
+    settings: TrainingSettings = TrainingSettings(),
+    *,
+    others: Sequence[Example] = (),
+    solve: SolveSettings | None = None,
+    corpus: str = "unknown",
+    name: str = "model",
+) -> Relearnt:
+    """Train on corrected takes and others, after comparing with the model before on takes held out.
+
+    Parameters
+    ----------
+    corrected, before, settings, others :
+        As in `held_out_labels`. Others that are named like a corrected take are left out: a take that is held out must
+        not be learnt from by another road.
+    solve, corpus, name : optional
+        As in `signface.learn.training.train_model`.
+
+    Raises
+    ------
+    SignfaceError
+        As `signface.learn.training.train_model`.
+    """
+    words = []
+    names = {_bare(example) for example in corrected}
+    apart = [example for example in others if _bare(example) not in names]
+    if len(apart) < len(others):
+        words.append(f"{len(others) - len(apart)} takes of the same name in --with are left out")
+    labels, scores = None, {}
+    if len(corrected) > 1:
+        labels = held_out_labels(corrected, before, settings, others=apart)
+        right_before, right = (labels[column] == labels["label"] for column in ("before", "after"))
+        better, worse = (right & ~right_before).sum(), (right_before & ~right).sum()
+        scores = {"accuracy on corrected takes held out": float(right.mean())}
+        words += [
+            f"stable segments of takes held out: {len(labels)} in {labels['take'].nunique()} takes",
+            f"  before ({before.name}): {right_before.mean():.2f} right",
+            f"  after: {right.mean():.2f} right ({better} better, {worse} worse)",
+        ]
+        if right.mean() < right_before.mean():
+            words.append(f"the new classifier does worse: stay with {before.name}, or learn from more takes (--with)")
+        known = {example.take for example in corrected} & set(before.card.takes)
+        if known:
+            words.append(f"{before.name} was trained on {len(known)} of these takes: its accuracy flatters it")
+    else:
+        words.append("one take cannot be held out of itself: no comparison")
+    model = train_model([*corrected, *apart], settings, solve=solve, corpus=corpus, scores=scores, name=name)
+    return Relearnt(model, labels, words)
 
 
 def held_out_labels(
@@ -70,3 +142,8 @@ def held_out_labels(
     if not tables:
         raise SignfaceError("the takes hold no stable segment", hint="look at their annotations")
     return pd.concat(tables, ignore_index=True)
+
+
+def _bare(example: Example) -> str:
+    """A take's name without the folders that it lies in."""
+    return example.take.rpartition("/")[2]

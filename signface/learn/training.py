@@ -1,6 +1,6 @@
 """Training a classifier on annotated takes (thesis 4.4.3).
 
-- `train_model`: a trained `TrainedModel`.
+- `train_model`: a trained `TrainedModel`; `train_each`: one for each signer.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from signface.errors import SignfaceError
 from signface.label.calibration import fit_calibration
@@ -88,6 +89,33 @@ def train_model(
     if settings.calibrate:
         model = _calibrated(model, takes, chosen)
     return replace(model, intensity=train_intensity(takes))
+
+
+def train_each(
+    examples: Sequence[Example], settings: TrainingSettings = TrainingSettings(), *, name: str = "model", **about: Any
+) -> dict[str, TrainedModel]:
+    """A classifier for each signer, trained on the signer's own takes and named `NAME-SIGNER`.
+
+    Parameters
+    ----------
+    examples, settings, name, **about :
+        As in `train_model`.
+
+    Returns
+    -------
+    dict of str to TrainedModel
+        By signer, in alphabetical order.
+
+    Raises
+    ------
+    SignfaceError
+        As `train_model`.
+    """
+    signers = sorted({example.signer for example in examples})
+    return {
+        signer: train_model([e for e in examples if e.signer == signer], settings, name=f"{name}-{signer}", **about)
+        for signer in signers
+    }
 
 
 def _calibrated(model: TrainedModel, examples: Sequence[Example], settings: TrainingSettings) -> TrainedModel:

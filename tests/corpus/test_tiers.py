@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 
 import numpy as np
@@ -15,7 +16,7 @@ from signface.corpus.examples import solve_examples
 from signface.corpus.manifest import read_corpus
 from signface.elan.document import read_document
 from signface.elan.reference import read_reference, read_tiers
-from signface.elan.vocabularies import read_vocabulary
+from signface.elan.vocabularies import read_vocabulary, write_vocabulary
 from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
 from signface.files import bundled_corpus
@@ -24,6 +25,7 @@ from signface.label.persistence import load_model, read_card
 from signface.label.vocabulary import Vocabulary
 from signface.learn.training import train_model
 from signface.segmentation.segments import Segments
+from tests.conftest import REPOSITORY
 from tests.fixtures.elan_files import assert_valid
 from tests.fixtures.training import quick
 
@@ -128,3 +130,14 @@ def test_the_commands_train_and_evaluate_on_a_tier(folder, tmp_path, capsys):
     assert not main(["annotate", str(take.path), "-o", str(tmp_path / "out.eaf"), "--classifier", str(model)])
     assert [name for name in read_tiers(tmp_path / "out.eaf")] == ["brows"]
     assert load_model(model).card == card
+
+
+def test_the_script_of_the_documentation_learns_a_tier(folder, tmp_path, monkeypatch, capsys):
+    text = (REPOSITORY / "docs" / "segments-and-labels.md").read_text(encoding="utf-8")
+    (script,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    shutil.copytree(folder, tmp_path / "corpora" / "lab")
+    write_vocabulary(BROWS, tmp_path / "brows.txt")
+    monkeypatch.chdir(tmp_path)
+    exec(compile(script, "docs/segments-and-labels.md", "exec"), {"__name__": "script"})
+    assert 0 <= float(capsys.readouterr().out) <= 1
+    assert set(read_tiers(tmp_path / "take.eaf")["brows@Eva"]["label"]) <= {"up", "down"}
