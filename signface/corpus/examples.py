@@ -11,6 +11,7 @@ from pathlib import Path
 from signface.corpus.describing import recipe_of, stored_or_solved
 from signface.corpus.manifest import Corpus, TakeEntry
 from signface.corpus.origin import Origin, Recipe, find_origin, make_recipe
+from signface.corpus.signers import find_signer
 from signface.corpus.store import DescriptorStore, open_store
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
@@ -99,6 +100,7 @@ def solve_examples(
                 sentence=entry.sentence,
                 vocabulary=vocabulary,
                 tier=named,
+                level=find_signer(corpus.folder, entry.signer).level,
             )
         )
     return examples

@@ -15,8 +15,8 @@ import pandas as pd
 
 from signface.label.model import TrainedModel
 from signface.label.spans import segment_means
+from signface.learn.examples import signer_levels
 from signface.metrics.classification import accuracy_interval
-from signface.signer import signer_level
 
 if TYPE_CHECKING:
     from signface.evaluation.protocol import Fold
@@ -121,11 +121,11 @@ def permutation_importance(
 
 def _segments_of(fold: Fold, model: TrainedModel) -> tuple[np.ndarray, tuple[str, ...], np.ndarray, np.ndarray]:
     """Mean descriptors, names of their columns, label and take of the reference's stable segments of the test takes."""
-    level = None if model.card.normalise == "none" else signer_level([example.descriptors for example in fold.test])
+    levels = signer_levels(fold.test) if model.card.normalise == "signer" else {}
     means, truth, take = [], [], []
     names: tuple[str, ...] = ()
     for example in fold.test:
-        seen = model.seen(example.descriptors, level)
+        seen = model.seen(example.descriptors, levels.get(example.signer))
         own, names = segment_means(seen, example.stable[["start_s", "end_s"]].to_numpy(float)), seen.names
         known = np.isfinite(own).all(axis=1)
         means.append(own[known])

@@ -21,11 +21,10 @@ from signface.evaluation.protocol import UNCALIBRATED, Fold
 from signface.label.labelling import label_spans
 from signface.label.model import TrainedModel
 from signface.label.spans import segment_means
-from signface.learn.examples import Example, in_order
+from signface.learn.examples import Example, in_order, signer_levels
 from signface.learn.training import train_model
 from signface.segmentation.segments import Segments
 from signface.settings.training import TrainingSettings
-from signface.signer import signer_level
 
 #: Training takes that one classifier may be trained on in all, over the whole curve: what bounds its time.
 MOST_TAKES = 400
@@ -161,9 +160,10 @@ def _plan(folds: Sequence[Fold], by: str, sizes: list[int], draws: int, most_tak
 
 def _hits(fold: Fold, model: TrainedModel) -> int:
     """How many stable segments of the reference of the test takes get their label."""
-    level = None if model.card.normalise == "none" else signer_level([example.descriptors for example in fold.test])
+    levels = signer_levels(fold.test) if model.card.normalise == "signer" else {}
     right, means, truths = 0, [], []
     for example in fold.test:
+        level = levels.get(example.signer)
         spans = example.stable[["start_s", "end_s"]].to_numpy(float)
         truth = example.stable["label"].to_numpy(object)
         of_take = segment_means(model.seen(example.descriptors, level), spans) if can_be_judged(model) else None

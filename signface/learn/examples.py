@@ -73,6 +73,8 @@ class Example:
         Of the reference's labels.
     tier : str
         What was annotated: `affect`, or the tier's name without its signer.
+    level : SignerLevel, optional
+        Where the signer's face rests, where the corpus says so (`signface.corpus.signers`).
 
     See Also
     --------
@@ -96,6 +98,7 @@ class Example:
     sentence: str | None = None
     vocabulary: Vocabulary = AFFECT
     tier: str = "affect"
+    level: SignerLevel | None = None
 
     def __post_init__(self) -> None:
         if not self.reference.labelled:
@@ -211,9 +214,12 @@ def in_order(examples: Sequence[Example]) -> list[Example]:
 
 
 def signer_levels(examples: Sequence[Example]) -> dict[str, SignerLevel]:
-    """The level of each signer, from all of these takes of theirs; no label is looked at."""
-    signers = sorted({example.signer for example in examples})
-    return {name: signer_level([e.descriptors for e in examples if e.signer == name]) for name in signers}
+    """The level of each signer: what the corpus says, or that of these takes of theirs; no label is looked at."""
+    levels = {example.signer: example.level for example in examples}
+    for name, level in levels.items():
+        if level is None:
+            levels[name] = signer_level([example.descriptors for example in examples if example.signer == name])
+    return {name: level for name, level in levels.items() if level is not None}
 
 
 def frame_table(

@@ -15,7 +15,7 @@ import pandas as pd
 from signface.errors import SignfaceError
 from signface.label.labelling import label_spans
 from signface.label.model import TrainedModel
-from signface.learn.examples import Example, in_order
+from signface.learn.examples import Example, in_order, signer_levels
 from signface.learn.training import train_model
 from signface.settings.solve import SolveSettings
 from signface.settings.training import TrainingSettings
@@ -130,6 +130,7 @@ def held_out_labels(
     for fold in range(folds):
         kept = [example for number, example in enumerate(ordered) if number % folds != fold]
         after = train_model([*kept, *others], settings.changed(calibrate=False))
+        levels = signer_levels(ordered)
         for example in ordered[fold::folds]:
             spans = example.stable[["start_s", "end_s"]].to_numpy(float)
             if not len(spans):
@@ -137,7 +138,9 @@ def held_out_labels(
             table = example.stable[["start_s", "end_s", "label"]].copy()
             table.insert(0, "take", example.take)
             for column, model in (("before", before), ("after", after)):
-                table[column] = np.array(label_spans(example.descriptors, spans, model)[0], dtype=object)
+                table[column] = np.array(
+                    label_spans(example.descriptors, spans, model, level=levels.get(example.signer))[0], dtype=object
+                )
             tables.append(table)
     if not tables:
         raise SignfaceError("the takes hold no stable segment", hint="look at their annotations")

@@ -24,6 +24,7 @@ from signface.elan.recogniser import read_parameters
 from signface.elan.reference import read_reference
 from signface.files import bundled_corpus
 from signface.label.persistence import load_model, save_model
+from signface.learn.examples import signer_levels
 from signface.learn.training import train_model
 from signface.settings.eaf import EafOptions
 from signface.settings.laboratory import read_settings
@@ -256,3 +257,18 @@ def test_another_value_is_another(laboratory):
     for kind in (SolveSettings, TrainingSettings, EafOptions):
         for item in fields(kind):
             assert getattr(kind(), item.name) != another_value(item)
+
+
+def test_the_level_of_a_corpuss_signer_counts_where_its_takes_are_learnt_from(laboratory, tmp_path):
+    folder = tmp_path / "corpus"
+    (folder / "signers").mkdir(parents=True)
+    (folder / "t.c3d").write_bytes((laboratory / "M2_EU_04.c3d").read_bytes())
+    (folder / "t.eaf").write_bytes((bundled_corpus() / "reference" / "M2_EU_04.eaf").read_bytes())
+    write_takes(folder, [TakeEntry(folder / "t.c3d", "M2", "EU", annotation=folder / "t.eaf")])
+    (alone,) = solve_examples(read_corpus(folder))
+    (folder / "signers" / "M2.json").write_bytes((laboratory / "M2.json").read_bytes())
+    (known,) = solve_examples(read_corpus(folder))
+    level = Signer.read(laboratory / "M2.json").level
+    assert alone.level is None
+    np.testing.assert_array_equal(signer_levels([known])["M2"].mean, level.mean)
+    assert np.abs(signer_levels([alone])["M2"].mean - level.mean).max() > 1e-3
