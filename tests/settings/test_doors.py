@@ -33,6 +33,7 @@ from signface.settings.training import TrainingSettings
 from signface.signer import Signer
 from signface.solver.solving import solve
 from signface.takes.reading import read_take
+from tests.conftest import REPOSITORY
 from tests.fixtures.settings import another_value, different_settings
 
 #: Command and action, and what of a decision it states otherwise.
@@ -272,3 +273,12 @@ def test_the_level_of_a_corpuss_signer_counts_where_its_takes_are_learnt_from(la
     assert alone.level is None
     np.testing.assert_array_equal(signer_levels([known])["M2"].mean, level.mean)
     assert np.abs(signer_levels([alone])["M2"].mean - level.mean).max() > 1e-3
+
+
+def test_the_manual_lists_every_setting():
+    text = (REPOSITORY / "docs" / "files.md").read_text(encoding="utf-8")
+    for kind in (SolveSettings, TrainingSettings, EafOptions):
+        for item in fields(kind):
+            flag = item.metadata["flag"] or f"--{item.name.replace('_', '-')}"
+            assert f"| `[{kind.TABLE}]` | `{item.name}` | `{flag}` |" in text
+            assert item.metadata["help"] in text
