@@ -108,12 +108,12 @@ def _from_text(file: Path) -> Vocabulary:
         raise SignfaceError("no such file", file=file) from error
     except (OSError, UnicodeDecodeError) as error:
         raise SignfaceError("cannot be read as text", file=file) from error
-    entries, said = [], []
+    entries, comments = [], []
     for number, line in enumerate(lines, start=1):
         if not line.strip():
             continue
         if line.startswith("#"):
-            said.append(line[1:].strip())
+            comments.append(line[1:].strip())
             continue
         value, description, colour, *more = [*(cell.strip() for cell in line.split("\t")), "", ""]
         if not value or any(more) or not re.fullmatch("(#[0-9a-fA-F]{6})?", colour):
@@ -128,7 +128,7 @@ def _from_text(file: Path) -> Vocabulary:
     twice = next((value for value in values if values.count(value) > 1), None)
     if twice is not None or not values:
         raise SignfaceError("holds no value" if twice is None else f"has {twice!r} twice", file=file)
-    return Vocabulary.of(entries, file.stem, " ".join(said))
+    return Vocabulary.of(entries, file.stem, " ".join(comments))
 
 
 def _chosen(root: etree._Element, tier: str | None, name: str | None, file: Path) -> etree._Element:
@@ -194,8 +194,8 @@ def _colours(preferences: Path, name: str) -> dict[str, Colour]:
     colours: dict[str, Colour] = {}
     for group in groups:
         for entry in group.iterfind("prefGroup") if group.get("key") == name else ():
-            found = re.fullmatch(r"(\d{1,3}),(\d{1,3}),(\d{1,3})", (entry.findtext("pref/Object") or "").strip())
-            if found is not None and all(int(part) < 256 for part in found.groups()):
-                red, green, blue = map(int, found.groups())
+            parts = re.fullmatch(r"(\d{1,3}),(\d{1,3}),(\d{1,3})", (entry.findtext("pref/Object") or "").strip())
+            if parts is not None and all(int(part) < 256 for part in parts.groups()):
+                red, green, blue = map(int, parts.groups())
                 colours[entry.get("key") or ""] = (red, green, blue)
     return colours

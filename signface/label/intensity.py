@@ -52,8 +52,8 @@ class IntensityClassifier:
         levels: list[int | None] = [None] * len(table)
         if judged.any():
             odds = strength[judged, None] * self.lines_[:, 0] + self.lines_[:, 1]
-            found = self.levels_[between_steps(1.0 / (1.0 + np.exp(-odds))).argmax(axis=1)]
-            for row, level in zip(np.flatnonzero(judged), found, strict=True):
+            judged_levels = self.levels_[between_steps(1.0 / (1.0 + np.exp(-odds))).argmax(axis=1)]
+            for row, level in zip(np.flatnonzero(judged), judged_levels, strict=True):
                 levels[row] = int(level)
         return levels
 

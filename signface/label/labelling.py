@@ -180,8 +180,8 @@ def find_segments(descriptors: Descriptors, model: TrainedModel, *, level: Signe
     """
     if not model.sequential:
         return label_segments(descriptors, segment(descriptors), model, level=level)
-    found = model.estimator.annotate(model.seen(descriptors, level))
-    table = found.table.copy()
+    segments = model.estimator.annotate(model.seen(descriptors, level))
+    table = segments.table.copy()
     stable = (table["kind"] == "stable").to_numpy()
     sure = table["confidence"].to_numpy(float).copy()
     sure[stable] = model.confidence(sure[stable])
@@ -190,7 +190,7 @@ def find_segments(descriptors: Descriptors, model: TrainedModel, *, level: Signe
     table["confidence"] = sure
     if not model.card.vocabulary.transitions:
         table = without_transitions(table)
-    labelled = found.changed(f"find_segments {model.name} ({model.card.classifier})", table)
+    labelled = segments.changed(f"find_segments {model.name} ({model.card.classifier})", table)
     return labelled if model.intensity is None else model.intensity.annotate(descriptors, labelled)
 
 

@@ -194,5 +194,5 @@ class TrainedModel:
 
 def _few(names: list[str], most: int = 5) -> str:
     """`a, b, c` or `a, b, c, d, e and 7 more`."""
-    shown = ", ".join(names[:most])
-    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
+    listed = ", ".join(names[:most])
+    return listed if len(names) <= most else f"{listed} and {len(names) - most} more"

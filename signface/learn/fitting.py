@@ -69,13 +69,13 @@ def _fit_frames(examples: Sequence[Example], settings: TrainingSettings, bases: 
         examples, features=settings.features, normalise=settings.normalise, rate=settings.rate
     )
     vocabulary = examples[0].vocabulary
-    shown = [label for label in vocabulary.values if label in set(labels)]
-    if len(shown) < 2:
+    taught = [label for label in vocabulary.values if label in set(labels)]
+    if len(taught) < 2:
         raise SignfaceError(
-            f"the training takes show {len(shown)} label{'s' * (len(shown) != 1)}, a classifier needs two or more",
+            f"the training takes show {len(taught)} label{'s' * (len(taught) != 1)}, a classifier needs two or more",
             hint="train on more takes, or look at their annotations",
         )
-    rarest = min(shown, key=lambda label: int((labels == label).sum()))
+    rarest = min(taught, key=lambda label: int((labels == label).sum()))
     if (labels == rarest).sum() < 3:
         raise SignfaceError(
             f"the training takes hold less than half a second of {vocabulary.spelt(rarest)}",

@@ -67,13 +67,13 @@ def classification_metrics(truth: Sequence[str], found: Sequence[str], labels: S
         "majority_label": None,
     }
     if total:
-        hits, said, there = np.diag(confusion), confusion.sum(axis=0), confusion.sum(axis=1)
-        present = said + there > 0
+        hits, called, there = np.diag(confusion), confusion.sum(axis=0), confusion.sum(axis=1)
+        present = called + there > 0
         most = int(there.argmax())
         result |= {
             "accuracy": float(hits.sum() / total),
             "balanced_accuracy": float((hits[there > 0] / there[there > 0]).mean()),
-            "macro_f1": float((2 * hits[present] / (said + there)[present]).mean()),
+            "macro_f1": float((2 * hits[present] / (called + there)[present]).mean()),
             "majority": float(there[most] / total),
             "majority_label": labels[most],
         }

@@ -94,19 +94,19 @@ class ChainLabeller(TakeLabeller):
             slope[(wide - 1) * held : wide * held] = 0
             return -likely / self.n_frames_ + float(cost.sum()), gradient + slope
 
-        found = minimize(
+        solution = minimize(
             loss, np.zeros((wide + held) * held), jac=True, method="L-BFGS-B", options={"maxiter": self.iterations}
         ).x
-        self.coefficients_ = found[: wide * held].reshape(wide, held).astype(np.float32)
-        self.following_ = found[wide * held :].reshape(held, held)
+        self.coefficients_ = solution[: wide * held].reshape(wide, held).astype(np.float32)
+        self.following_ = solution[wide * held :].reshape(held, held)
         return self
 
     def frame_probabilities(self, take: Descriptors) -> np.ndarray:
         """(K, A + 1) probability of each of `classes_`, and of a transition, at each frame, over all courses."""
         scores = self._scores(take)
-        found, _, _ = _expected(scores, self.following_, [len(scores)])
+        probability, _, _ = _expected(scores, self.following_, [len(scores)])
         held = len(self.classes_)
-        return np.concatenate([found[:, :held], found[:, held:].sum(axis=1, keepdims=True)], axis=1)
+        return np.concatenate([probability[:, :held], probability[:, held:].sum(axis=1, keepdims=True)], axis=1)
 
     def find(self, take: Descriptors) -> tuple[np.ndarray, list[tuple[int, int, int]]]:
         """See `TakeLabeller`; of the courses, the likeliest in which a transition leads to another label."""
@@ -141,8 +141,8 @@ class ChainLabeller(TakeLabeller):
         states[-1] = int(np.where(part == 0, best, -np.inf).argmax())
         for frame in range(len(scores) - 1, 0, -1):
             states[frame - 1] = came[frame, states[frame]]
-        said = np.where(part[states] == 0, label[states], -1)
-        return [(first, last, int(said[first])) for first, last in stretches(said).tolist()]
+        codes = np.where(part[states] == 0, label[states], -1)
+        return [(first, last, int(codes[first])) for first, last in stretches(codes).tolist()]
 
 
 def log_likelihood(

@@ -180,11 +180,11 @@ def train_network(
                 features, codes, marks = (
                     torch.from_numpy(part) for part in _drawn(lessons, batch, settings, mirrored, rng)
                 )
-                said = network(features)
+                output = network(features)
                 known = codes != UNKNOWN
-                loss = torch.nn.functional.cross_entropy(said[known][:, :states], codes[known])
+                loss = torch.nn.functional.cross_entropy(output[known][:, :states], codes[known])
                 loss = loss + MARKS * torch.nn.functional.binary_cross_entropy_with_logits(
-                    said[known][:, states:], marks[known]
+                    output[known][:, states:], marks[known]
                 )
                 optimiser.zero_grad()
                 loss.backward()

@@ -183,9 +183,9 @@ class SequenceLabeller(TakeLabeller):
     def frame_probabilities(self, take: Descriptors) -> np.ndarray:
         """(K, A + 1) probability of each of `classes_`, and of a transition, at the times of `frame_times`."""
         place = [list(self.frames_.classes_).index(name) for name in (*self.classes_, *HALVES)]
-        found = self.frames_.predict_proba(self._features(take))[:, place]
+        probability = self.frames_.predict_proba(self._features(take))[:, place]
         held = len(self.classes_)
-        return np.concatenate([found[:, :held], found[:, held:].sum(axis=1, keepdims=True)], axis=1)
+        return np.concatenate([probability[:, :held], probability[:, held:].sum(axis=1, keepdims=True)], axis=1)
 
     def find(self, take: Descriptors) -> tuple[np.ndarray, list[tuple[int, int, int]]]:
         """See `TakeLabeller`."""

@@ -129,10 +129,10 @@ class TakeLabeller(BaseEstimator, ABC):
     def score(self, takes: Sequence[Descriptors], references: Sequence[Segments]) -> float:
         """Share of frames that get the reference's label, all transitions counted as one label."""
         right = total = 0
-        for found, reference, take in zip(self.predict(takes), references, takes, strict=True):
+        for segments, reference, take in zip(self.predict(takes), references, takes, strict=True):
             times = self.frame_times(take)
-            truth, said = frame_states(reference, times), frame_states(found, times)
-            right += int((truth == said)[truth != ""].sum())
+            truth, states = frame_states(reference, times), frame_states(segments, times)
+            right += int((truth == states)[truth != ""].sum())
             total += int((truth != "").sum())
         return right / total if total else float("nan")
 

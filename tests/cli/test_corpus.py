@@ -195,7 +195,7 @@ def newer_store(folder):
 
 
 SPOILT = {
-    one_class: "the training takes show 1 expression, a classifier needs two or more",
+    one_class: "the training takes show 1 label, a classifier needs two or more",
     untrained_signer: "no annotated take of the kind IE to train on for the signer S2",
     empty_annotation: "S1-IE-A.eaf: its reference annotation is empty",
     foreign_labels: "S1-IE-J.eaf: label 'Wonder' on tier affect@S1",
