@@ -18,14 +18,14 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from signface.corpus.examples import solve_examples
+from signface.corpus.examples import solve_corpus
 from signface.corpus.manifest import read_corpus
 from signface.evaluation.protocol import score_model
 from signface.files import whole_file
 from signface.label.model import Card
 from signface.label.persistence import save_model
 from signface.label.vocabulary import AFFECT
-from signface.learn.training import Example, train_model
+from signface.learn.training import Example, train
 from signface.progress import progress
 from signface.settings.choices import NAMES, SEQUENCE_NAMES
 from signface.settings.solve import SolveSettings
@@ -48,31 +48,31 @@ def main() -> None:
     parser.add_argument("train", type=Path, help="folder of the corpus to train on")
     parser.add_argument("test", type=Path, help="folder of the corpus to measure on")
     arguments = parser.parse_args()
-    train, test = (
-        solve_examples(corpus, progress=partial(progress, what="solving", total=len(corpus)))
+    training, test = (
+        solve_corpus(corpus, progress=partial(progress, what="solving", total=len(corpus)))
         for corpus in (
             read_corpus(arguments.train),
             read_corpus(arguments.test).select(kinds=TEST_KINDS),
         )
     )
     for name in SHIPPED:
-        build(name, train, test)
+        build(name, training, test)
         print((FOLDER / f"{name}.md").read_text(encoding="utf-8"))
 
 
-def build(name: str, train: list[Example], test: list[Example]) -> None:
+def build(name: str, training: list[Example], test: list[Example]) -> None:
     """Train, measure and write one classifier.
 
     Parameters
     ----------
     name : str
         One of `SHIPPED`.
-    train, test : list of Example
+    training, test : list of Example
         Solved takes of the two corpora.
     """
     classifier, kinds = SHIPPED[name]
-    model = train_model(
-        [example for example in train if example.kind in kinds],
+    model = train(
+        [example for example in training if example.kind in kinds],
         TrainingSettings(classifier=classifier, calibrate=False),
         solve=SolveSettings(layout="default-40"),
         corpus="synthetic (signface synth)",

@@ -14,6 +14,7 @@
 `choose_layout`             The shipped layout that fits a recording's markers
 `read_reference`            What an annotator said of the affect, from an EAF
 `read_tiers`                All tiers of an EAF, as tables
+`read_vocabulary`           The labels of a tier, from an EAF, a template or a text file
 `read_segments`             Segments that were written before
 `read_settings`             What a laboratory decided once, from its TOML
 `datasets`                  Synthetic recordings to try things on
@@ -44,10 +45,13 @@
 =========================== ==============================================================================
 `read_corpus`               The takes of a corpus, from its `takes.csv`
 `run_corpus`                Solve and annotate all of it
+`solve_corpus`              Its annotated takes, solved: what training and evaluation learn from
+`train`                     A classifier of one's own, for affect or any other tier
+`save_model`                A trained classifier to a file
+`evaluate`                  Classifiers measured on takes and signers that they were not trained on
+`write_report`              A page of what was measured, with figures and tables
 `frame_table`               Frames and their labels as X and y, for scikit-learn
 `make_labeller`             An untrained classifier by its name, an estimator of scikit-learn
-`save_model`                A trained classifier to a file
-`folds_of`                  Who is trained on and who is tested
 `agreement_table`           How far annotators agree
 =========================== ==============================================================================
 
@@ -59,10 +63,10 @@
 =========================== ==============================================================================
 
 **Decisions**: `SolveSettings` (how to solve), `TrainingSettings` (how to train), `EafOptions` (how to write an EAF),
-`Signer` (who signs).
+`Signer` (who signs), `Vocabulary` (what a tier may say).
 
 **Data**: `Take`, `FaceModel`, `MarkerLayout`, `Descriptors` (weights in time), `Segments`, `Annotation`,
-`TrainedModel`, `Corpus`, `Example` (a take with its reference).
+`TrainedModel`, `Corpus`, `Example` (a take with its reference), `Measured` (an evaluation).
 
 **Errors**: `SignfaceError` is raised for whatever the user can mend, `SignfaceWarning` warned of.
 

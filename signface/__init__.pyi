@@ -1,13 +1,15 @@
 from . import datasets
 from .annotation import Annotation, annotate
+from .corpus.examples import solve_corpus
 from .corpus.manifest import Corpus, read_corpus
 from .corpus.running import run_corpus
 from .descriptors import Descriptors
 from .descriptors_files import read_weights, write_weights
 from .elan.reference import read_reference, read_tiers
+from .elan.vocabularies import read_vocabulary
 from .elan.writing import write_eaf
 from .errors import SignfaceError, SignfaceWarning
-from .evaluation.protocol import folds_of
+from .evaluation.measure import Measured, evaluate
 from .face.layout import MarkerLayout
 from .face.layout_files import choose_layout, read_layout
 from .face.model import FaceModel
@@ -16,9 +18,12 @@ from .label.labellers import make_labeller
 from .label.labelling import label_segments
 from .label.model import TrainedModel
 from .label.persistence import load_model, save_model
+from .label.vocabulary import Vocabulary
 from .learn.examples import Example, frame_table
+from .learn.training import train
 from .metrics.agreement import agreement_table
 from .render.still import draw_face
+from .report.evaluation.report import write_report
 from .report.timeline import draw_timeline
 from .segmentation.cutting import segment
 from .segmentation.energy import energies
@@ -41,6 +46,7 @@ __all__ = [
     "Example",
     "FaceModel",
     "MarkerLayout",
+    "Measured",
     "Segments",
     "Signer",
     "SignfaceError",
@@ -49,6 +55,7 @@ __all__ = [
     "Take",
     "TrainedModel",
     "TrainingSettings",
+    "Vocabulary",
     "agreement_table",
     "annotate",
     "calibrate_signer",
@@ -57,7 +64,7 @@ __all__ = [
     "draw_face",
     "draw_timeline",
     "energies",
-    "folds_of",
+    "evaluate",
     "frame_table",
     "label_segments",
     "load_model",
@@ -72,13 +79,17 @@ __all__ = [
     "read_settings",
     "read_take",
     "read_tiers",
+    "read_vocabulary",
     "read_weights",
     "run_corpus",
     "save_model",
     "segment",
     "solve",
+    "solve_corpus",
     "solve_pieces",
+    "train",
     "write_eaf",
+    "write_report",
     "write_segments",
     "write_weights",
 ]

@@ -137,7 +137,7 @@ def map_template(arguments: argparse.Namespace) -> None:
 
 def learn_corrections(arguments: argparse.Namespace) -> None:
     """Show the corrections, compare before and after on takes held out, train on all and save."""
-    from signface.corpus.examples import solve_examples
+    from signface.corpus.examples import solve_corpus
     from signface.corpus.manifest import read_corpus
     from signface.elan.reference import corpus_corrections
     from signface.evaluation.corrections import compare_corrections
@@ -165,9 +165,7 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
         count = sum(entry.annotation is not None for entry in takes)
         shown = partial(progress, what="solving", total=count)
         sparse = not card.vocabulary.blank
-        return solve_examples(
-            takes, settings=solve, tier=card.tier, vocabulary=vocabulary, sparse=sparse, progress=shown
-        )
+        return solve_corpus(takes, settings=solve, tier=card.tier, vocabulary=vocabulary, sparse=sparse, progress=shown)
 
     learnt = learn_corrections(
         solved(arguments.corpus),

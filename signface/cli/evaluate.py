@@ -76,12 +76,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Solve, train, compare, write and print."""
-    from signface.corpus.examples import solve_examples
-    from signface.corpus.facts import corpus_facts
+    from signface.corpus.examples import solve_corpus
     from signface.corpus.manifest import read_corpus
-    from signface.evaluation.measure import measure
-    from signface.face.reading import read_face
-    from signface.report.evaluation.evaluated import Evaluated
+    from signface.evaluation.measure import evaluate
     from signface.report.evaluation.report import write_report
 
     unknown = [name for name in arguments.classifiers if name not in NAMES | SEQUENCE_NAMES]
@@ -96,13 +93,13 @@ def run(arguments: argparse.Namespace) -> None:
         raise SignfaceError("is a file, not a folder", file=arguments.output, hint="name a folder for the report")
     whole = read_corpus(arguments.corpus)
     corpus = whole.select(kinds=[*arguments.train_kinds, *arguments.test_kinds])
-    examples = solve_examples(
+    examples = solve_corpus(
         corpus,
         settings=solve,
         **tier_options(arguments),
         progress=lambda items: progress(items, "solving", total=sum(t.annotation is not None for t in corpus)),
     )
-    metrics, segments = measure(
+    measured = evaluate(
         examples,
         settings,
         protocols=[arguments.protocol] if arguments.protocol else None,
@@ -112,11 +109,8 @@ def run(arguments: argparse.Namespace) -> None:
         curves_of=arguments.classifiers if arguments.learning_curve else None,
         progress=progress,
     )
-    facts = corpus_facts(corpus, settings=solve)
-    metrics["corpus"] = facts
-    face = read_face(solve.face) if facts["faces"] else None
-    page = write_report(Evaluated(metrics, facts, examples, segments, face, arguments.date), arguments.output)
-    print_results(metrics)
+    page = write_report(measured, examples, corpus, arguments.output, settings=solve, date=arguments.date)
+    print_results(measured.metrics)
     print(f"report: {page}")
 
 

@@ -68,7 +68,7 @@ def add_tier_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def tier_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """The options of `solve_examples` that `add_tier_arguments` asks for."""
+    """The options of `solve_corpus` that `add_tier_arguments` asks for."""
     vocabulary = None
     if arguments.vocabulary is not None:
         from signface.elan.vocabularies import read_vocabulary
@@ -111,10 +111,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Solve the training takes, train, and write one classifier or one for each signer."""
-    from signface.corpus.examples import solve_examples
+    from signface.corpus.examples import solve_corpus
     from signface.corpus.manifest import read_corpus
     from signface.label.persistence import save_model
-    from signface.learn.training import train_each, train_model
+    from signface.learn.training import train, train_each
 
     output = arguments.output
     if output.suffix.lower() != ".skops":
@@ -130,14 +130,14 @@ def run(arguments: argparse.Namespace) -> None:
             hint="name other kinds or another signer",
         )
     annotated = sum(take.annotation is not None for take in corpus)
-    examples = solve_examples(
+    examples = solve_corpus(
         corpus,
         settings=solve,
         **tier_options(arguments),
         progress=lambda items: progress(items, "solving", total=annotated),
     )
-    train = train_each if arguments.signer == "each" else train_model
-    trained = train(examples, settings, solve=solve, corpus=whole.folder.resolve().name, name=output.stem)
+    training = train_each if arguments.signer == "each" else train
+    trained = training(examples, settings, solve=solve, corpus=whole.folder.resolve().name, name=output.stem)
     for model in trained.values() if isinstance(trained, dict) else [trained]:
         file = output.with_name(f"{model.name}{output.suffix}")
         save_model(model, file)

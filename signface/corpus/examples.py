@@ -1,6 +1,6 @@
 """The takes of a corpus, solved, with their reference annotations: what training and evaluation work on.
 
-- `solve_examples`: one `Example` for each annotated take.
+- `solve_corpus`: one `Example` for each annotated take.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ NONE = "none"
 WORKERS = 2
 
 
-def solve_examples(
+def solve_corpus(
     corpus: Corpus,
     *,
     settings: SolveSettings | None = None,
@@ -69,6 +69,19 @@ def solve_examples(
     ------
     SignfaceError
         No take is annotated, a recording or annotation cannot be used, or the store was written by a newer signface.
+
+    See Also
+    --------
+    signface.train, signface.evaluate : what they are for.
+
+    Examples
+    --------
+    >>> from shutil import copytree
+    >>> import signface as sf
+    >>> corpus = sf.read_corpus(copytree(sf.datasets.mini_file().parent, "feel"))
+    >>> examples = solve_corpus(corpus.select(kinds=["EU"]), settings=sf.SolveSettings(alpha=0.3))
+    >>> [(example.take, len(example.stable)) for example in examples]
+    [('M1_EU_11', 4), ('M2_EU_04', 3)]
     """
     entries = [entry for entry in corpus if entry.annotation is not None]
     if not entries:

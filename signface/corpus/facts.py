@@ -35,7 +35,7 @@ def corpus_facts(corpus: Corpus, *, settings: SolveSettings | None = None) -> di
     corpus : Corpus
         Its annotated takes are described; their recordings are read.
     settings : SolveSettings, optional
-        As for `signface.corpus.examples.solve_examples`.
+        As for `signface.corpus.examples.solve_corpus`.
 
     Returns
     -------

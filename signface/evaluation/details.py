@@ -17,7 +17,7 @@ from signface.evaluation.importance import can_be_judged, permutation_importance
 from signface.evaluation.learning_curve import learning_curve, remembering
 from signface.evaluation.protocol import UNCALIBRATED, Evaluation, Fold
 from signface.learn.examples import Example
-from signface.learn.training import train_model
+from signface.learn.training import train
 from signface.metrics.segmentation import segmentation_metrics
 from signface.segmentation.segments import Segments
 from signface.settings.choices import NAMES
@@ -102,7 +102,7 @@ def details(
         - `reliability`: protocol and classifier to share right by confidence.
     """
     plain = settings.changed(search=False, calibrate=False)
-    train = remembering()
+    remembered = remembering()
     found = {protocol: evaluation.found for protocol, evaluation in evaluations.items()}
     result: dict[str, Any] = {"segmentation_by_kind": segmentation_by_kind(examples, segments, found)}
     curves: dict[str, list] = {}
@@ -118,7 +118,7 @@ def details(
                 classifiers=drawn,
                 by="signers" if signers > 1 else "takes",
                 whole={} if settings.search else {name: scores[name]["manual_segments"]["accuracy"] for name in drawn},
-                train=train,
+                train=remembered,
                 progress=lambda steps, protocol=protocol: progress(steps, f"learning curve {protocol}"),  # type: ignore[misc]
             )
             curves[protocol] = _records(curve)
@@ -126,9 +126,7 @@ def details(
             continue
         for name in [name for name in scores if name in NAMES]:
             models = [
-                train_model(
-                    fold.train, plain.for_classifier(name).changed(parameters=trained[name]["parameters"]), name=name
-                )
+                train(fold.train, plain.for_classifier(name).changed(parameters=trained[name]["parameters"]), name=name)
                 for fold, trained in zip(folds[protocol], evaluation.trained, strict=True)
             ]
             if all(map(can_be_judged, models)):

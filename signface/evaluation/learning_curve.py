@@ -22,7 +22,7 @@ from signface.label.labelling import label_spans
 from signface.label.model import TrainedModel
 from signface.label.spans import segment_means
 from signface.learn.examples import Example, in_order, signer_levels
-from signface.learn.training import train_model
+from signface.learn.training import train
 from signface.segmentation.segments import Segments
 from signface.settings.training import TrainingSettings
 
@@ -45,7 +45,7 @@ def learning_curve(
     whole: Mapping[str, float] | None = None,
     draws: int = 3,
     most_takes: int = MOST_TAKES,
-    train: Callable[..., TrainedModel] = train_model,
+    train: Callable[..., TrainedModel] = train,
     progress: Callable[[Iterable], Iterable] = iter,
 ) -> pd.DataFrame:
     """Accuracy on the reference's stable segments of the test takes, for growing parts of the training takes.
@@ -70,7 +70,7 @@ def learning_curve(
         Takes that one classifier may be trained on over the whole curve; fewer orders are drawn, at least one, so that
         this is kept. With very many takes, points are left out.
     train : callable, optional
-        Trains a model, as `train_model` does, from examples, settings and `name`.
+        Trains a model, as `train` does, from examples, settings and `name`.
     progress : callable, optional
         Wraps the list of steps, to show how far it is.
 
@@ -181,7 +181,7 @@ def _hits(fold: Fold, model: TrainedModel) -> int:
     return right
 
 
-def remembering(train: Callable[..., TrainedModel] = train_model) -> Callable[..., TrainedModel]:
+def remembering(train: Callable[..., TrainedModel] = train) -> Callable[..., TrainedModel]:
     """The same training, but what was trained on the same takes before is not trained again.
 
     With two signers, classifiers for a signer never met are those of the other signer.

@@ -1,6 +1,6 @@
 """Everything that is measured on an annotated corpus.
 
-- `measure`: the content of metrics.json, and the annotations that came out.
+- `evaluate`: the content of metrics.json, and the annotations that came out.
 - `Measured`: the two of them.
 """
 
@@ -11,7 +11,7 @@ from functools import partial
 from typing import NamedTuple
 
 from signface.evaluation.details import details
-from signface.evaluation.protocol import PROTOCOLS, UNCALIBRATED, Evaluation, Fold, evaluate, folds_of
+from signface.evaluation.protocol import PROTOCOLS, UNCALIBRATED, Evaluation, Fold, evaluate_folds, folds_of
 from signface.learn.examples import Example
 from signface.segmentation.cutting import segment
 from signface.segmentation.segments import Segments
@@ -28,13 +28,24 @@ class Measured(NamedTuple):
         The content of metrics.json (docs/files.md).
     segments : mapping
         Protocol, classifier and take to the labelled segments that came out.
+
+    See Also
+    --------
+    signface.write_report : a page of it.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> measured = sf.evaluate(sf.datasets.mini_examples(), classifiers=["knn1"], protocols=["across"])
+    >>> list(measured.segments["across"]["knn1"])
+    ['M1_EU_11', 'M2_EU_04']
     """
 
     metrics: dict
     segments: Mapping[str, Mapping[str, Mapping[str, Segments]]]
 
 
-def measure(
+def evaluate(
     examples: Sequence[Example],
     settings: TrainingSettings = UNCALIBRATED,
     *,
@@ -72,11 +83,19 @@ def measure(
     Raises
     ------
     SignfaceError
-        As `signface.evaluation.protocol.folds_of` and `signface.learn.training.train_model`.
+        As `signface.evaluation.protocol.folds_of` and `signface.learn.training.train`.
 
     See Also
     --------
-    signface.report.evaluation.report.write_report : a page with figures and tables of it.
+    signface.write_report : a page with figures and tables of it.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> examples = sf.datasets.mini_examples()
+    >>> measured = evaluate(examples, classifiers=["knn1"], protocols=["across"])
+    >>> sorted(measured.metrics["classifiers"]["knn1"])
+    ['automatic_segments', 'frames', 'manual_segments']
     """
     if protocols is None:
         protocols = list(PROTOCOLS) if len({example.signer for example in examples}) > 1 else ["within"]
@@ -86,7 +105,7 @@ def measure(
     metrics: dict = {}
     for protocol in protocols:
         folds[protocol] = folds_of(examples, protocol=protocol, train_kinds=train_kinds, test_kinds=test_kinds)
-        evaluations[protocol] = evaluate(
+        evaluations[protocol] = evaluate_folds(
             folds[protocol],
             settings,
             classifiers=classifiers,

@@ -3,7 +3,7 @@
 - `PROTOCOLS`: what is trained on what.
 - `folds_of`: training and test takes of each signer.
 - `UNCALIBRATED`: the settings of a plain evaluation.
-- `evaluate`: every classifier on every fold, on reference segments, automatic segments and frames.
+- `evaluate_folds`: every classifier on every fold, on reference segments, automatic segments and frames.
 - `score_model`: the same for one model that is trained already.
 """
 
@@ -27,7 +27,7 @@ from signface.label.vocabulary import Vocabulary
 from signface.learn.examples import Example, common_vocabulary, signer_levels
 from signface.learn.folds import groups_of, inner_folds
 from signface.learn.ordinal import ordinal_metrics
-from signface.learn.training import train_model
+from signface.learn.training import train
 from signface.metrics.classification import accuracy_interval, classification_metrics, mcnemar
 from signface.metrics.segmentation import segmentation_metrics
 from signface.segmentation.cutting import segment
@@ -81,7 +81,7 @@ class Fold:
 
 @dataclass
 class Evaluation:
-    """What `evaluate` measured.
+    """What `evaluate_folds` measured.
 
     `metrics` is the content of metrics.json (see CONTRACT.md); `by_signer` has, for each signer, the same dictionary
     of classifiers. `tables` has what they were counted from: for each classifier its `manual_segments` and
@@ -178,7 +178,7 @@ def _turns(signer: str, train: Sequence[Example], test: Sequence[Example], turns
     return folds
 
 
-def evaluate(
+def evaluate_folds(
     folds: Sequence[Fold],
     settings: TrainingSettings = UNCALIBRATED,
     *,
@@ -233,7 +233,7 @@ def evaluate(
     steps = [(number, name) for number in range(len(folds)) for name in classifiers]
     for number, name in progress(steps):
         fold = folds[number]
-        model = train_model(fold.train, settings.for_classifier(name), name=name)
+        model = train(fold.train, settings.for_classifier(name), name=name)
         card = model.card
         trained[number][name] = {
             "parameters": dict(card.parameters),
@@ -277,7 +277,7 @@ def evaluate(
 
 
 def score_model(model: TrainedModel, test: Sequence[Example], *, seed: int = 0) -> dict:
-    """What `evaluate` measures, for a model that is trained already, on takes that it was not trained on.
+    """What `evaluate_folds` measures, for a model that is trained already, on takes that it was not trained on.
 
     Returns
     -------

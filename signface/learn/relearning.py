@@ -16,7 +16,7 @@ from signface.errors import SignfaceError
 from signface.label.labelling import label_spans
 from signface.label.model import TrainedModel
 from signface.learn.examples import Example, in_order, signer_levels
-from signface.learn.training import train_model
+from signface.learn.training import train
 from signface.settings.solve import SolveSettings
 from signface.settings.training import TrainingSettings
 
@@ -56,12 +56,12 @@ def learn_corrections(
         As in `held_out_labels`. Others that are named like a corrected take are left out: a take that is held out must
         not be learnt from by another road.
     solve, corpus, name : optional
-        As in `signface.learn.training.train_model`.
+        As in `signface.learn.training.train`.
 
     Raises
     ------
     SignfaceError
-        As `signface.learn.training.train_model`.
+        As `signface.learn.training.train`.
     """
     words = []
     names = {_bare(example) for example in corrected}
@@ -86,7 +86,7 @@ def learn_corrections(
             words.append(f"{before.name} was trained on {len(known)} of these takes: its accuracy flatters it")
     else:
         words.append("one take cannot be held out of itself: no comparison")
-    model = train_model([*corrected, *apart], settings, solve=solve, corpus=corpus, scores=scores, name=name)
+    model = train([*corrected, *apart], settings, solve=solve, corpus=corpus, scores=scores, name=name)
     return Relearnt(model, labels, words)
 
 
@@ -129,7 +129,7 @@ def held_out_labels(
     tables = []
     for fold in range(folds):
         kept = [example for number, example in enumerate(ordered) if number % folds != fold]
-        after = train_model([*kept, *others], settings.changed(calibrate=False))
+        after = train([*kept, *others], settings.changed(calibrate=False))
         levels = signer_levels(ordered)
         for example in ordered[fold::folds]:
             spans = example.stable[["start_s", "end_s"]].to_numpy(float)

@@ -1,6 +1,6 @@
 """Training a classifier on annotated takes (thesis 4.4.3).
 
-- `train_model`: a trained `TrainedModel`; `train_each`: one for each signer.
+- `train`: a trained `TrainedModel`; `train_each`: one for each signer.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from signface.settings.solve import SolveSettings
 from signface.settings.training import TrainingSettings
 
 
-def train_model(
+def train(
     examples: Sequence[Example],
     settings: TrainingSettings = TrainingSettings(),
     *,
@@ -63,9 +63,17 @@ def train_model(
 
     See Also
     --------
-    signface.corpus.examples.solve_examples : the annotated takes of a corpus.
-    signface.label.persistence.save_model : writes what was trained.
-    signface.evaluation.protocol.evaluate : trains and tests in folds.
+    signface.solve_corpus : the annotated takes of a corpus.
+    signface.save_model : writes what was trained.
+    signface.evaluate : trains and tests in folds.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> examples = sf.datasets.mini_examples()
+    >>> model = train(examples, sf.TrainingSettings(classifier="knn3", calibrate=False))
+    >>> model.card.labels
+    ('A', 'D', 'J', 'N', 'Su')
     """
     if not examples:
         raise SignfaceError("there is no annotated take to train on", hint="name other kinds or another signer")
@@ -99,7 +107,7 @@ def train_each(
     Parameters
     ----------
     examples, settings, name, **about :
-        As in `train_model`.
+        As in `train`.
 
     Returns
     -------
@@ -109,11 +117,11 @@ def train_each(
     Raises
     ------
     SignfaceError
-        As `train_model`.
+        As `train`.
     """
     signers = sorted({example.signer for example in examples})
     return {
-        signer: train_model([e for e in examples if e.signer == signer], settings, name=f"{name}-{signer}", **about)
+        signer: train([e for e in examples if e.signer == signer], settings, name=f"{name}-{signer}", **about)
         for signer in signers
     }
 

@@ -25,7 +25,7 @@ class TrainingSettings(Settings):
 
     See Also
     --------
-    signface.learn.training.train_model : which is told of it.
+    signface.learn.training.train : which is told of it.
 
     Examples
     --------

@@ -11,11 +11,11 @@ import pyarrow.parquet as pq
 import pytest
 
 from signface.cli.main import main
-from signface.corpus.examples import solve_examples
+from signface.corpus.examples import solve_corpus
 from signface.corpus.manifest import TakeEntry, read_corpus, write_takes
 from signface.descriptors_files import write_weights
 from signface.elan.writing import write_eaf
-from signface.evaluation.measure import measure
+from signface.evaluation.measure import evaluate
 from signface.label.persistence import load_model, read_card
 from signface.segmentation.segments import Segments
 from signface.settings.choices import NAMES
@@ -138,9 +138,9 @@ def test_the_report_needs_nothing_outside_itself(folder, tmp_path):
 
 @pytest.mark.slow
 def test_metrics_say_what_was_chosen_in_each_fold_and_how_reliable_it_is(folder):
-    examples = solve_examples(read_corpus(folder))
+    examples = solve_corpus(read_corpus(folder))
     settings = TrainingSettings(search=True, folds=2)
-    metrics, _ = measure(examples, settings, protocols=["within"], train_kinds=["IE", "EU"], classifiers=["knn1"])
+    metrics, _ = evaluate(examples, settings, protocols=["within"], train_kinds=["IE", "EU"], classifiers=["knn1"])
     tested = [take for fold in metrics["protocol"]["folds"] for take in fold["test_takes"]]
     assert len(tested) == len(set(tested)) == 12
     for fold in metrics["protocol"]["folds"]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from signface.corpus.examples import solve_examples
+from signface.corpus.examples import solve_corpus
 from signface.corpus.manifest import Corpus, TakeEntry
 from signface.descriptors_files import write_weights
 from signface.elan.writing import write_eaf
@@ -24,7 +24,7 @@ def entry(tmp_path):
 
 def test_an_example_has_the_weights_and_the_reference_of_its_take(entry, tmp_path):
     made, row = entry
-    (found,) = solve_examples(Corpus(tmp_path, (row,)))
+    (found,) = solve_corpus(Corpus(tmp_path, (row,)))
     assert (found.take, found.signer, found.kind) == ("S1/laugh", "S1", "EU")
     np.testing.assert_allclose(found.descriptors.weights, made.descriptors.weights, atol=1e-6)
     assert found.reference.table.label.tolist() == made.reference.table.label.tolist()
@@ -34,16 +34,16 @@ def test_an_example_has_the_weights_and_the_reference_of_its_take(entry, tmp_pat
 def test_a_take_is_placed_on_the_time_line_of_its_video(entry, tmp_path):
     _, row = entry
     later = TakeEntry(row.path, "S1", "EU", annotation=row.annotation, start_s=12.5)
-    (found,) = solve_examples(Corpus(tmp_path, (later,)))
+    (found,) = solve_corpus(Corpus(tmp_path, (later,)))
     assert found.descriptors.start == 12.5
 
 
 def test_takes_without_annotation_are_left_out(entry, tmp_path):
     _, row = entry
     bare = TakeEntry(row.path, "S1", "IE")
-    assert len(solve_examples(Corpus(tmp_path, (bare, row)))) == 1
+    assert len(solve_corpus(Corpus(tmp_path, (bare, row)))) == 1
     with pytest.raises(SignfaceError, match="none of the takes"):
-        solve_examples(Corpus(tmp_path, (bare,)))
+        solve_corpus(Corpus(tmp_path, (bare,)))
 
 
 def test_what_is_wrong_in_one_of_several_takes_is_said(entry, tmp_path):
@@ -51,4 +51,4 @@ def test_what_is_wrong_in_one_of_several_takes_is_said(entry, tmp_path):
     broken = tmp_path / "S1" / "broken.c3d"
     broken.write_bytes(b"nonsense")
     with pytest.raises(SignfaceError, match=r"broken\.c3d"):
-        solve_examples(Corpus(tmp_path, (row, TakeEntry(broken, "S1", "EU", annotation=row.annotation))))
+        solve_corpus(Corpus(tmp_path, (row, TakeEntry(broken, "S1", "EU", annotation=row.annotation))))

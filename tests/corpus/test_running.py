@@ -22,7 +22,7 @@ from signface.corpus.running import run_corpus
 from signface.descriptors_files import write_weights
 from signface.errors import SignfaceError
 from signface.label.persistence import save_model
-from signface.learn.training import train_model
+from signface.learn.training import train
 from signface.settings.solve import SolveSettings
 from tests.conftest import REPOSITORY
 from tests.fixtures.hand_made import corpus as hand_made_corpus
@@ -42,7 +42,7 @@ def ready(tmp_path_factory):
         write_weights(made.descriptors, path)
         entries.append(TakeEntry(path, made.signer, made.kind))
     write_takes(folder / "feel", entries)
-    save_model(train_model(examples, quick("knn1")), folder / "mine.skops")
+    save_model(train(examples, quick("knn1")), folder / "mine.skops")
     assert len(entries) == TAKES
     return folder
 

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from signface.cli.main import main
-from signface.corpus.examples import solve_examples
+from signface.corpus.examples import solve_corpus
 from signface.corpus.manifest import Corpus, TakeEntry, read_corpus, write_takes
 from signface.corpus.origin import Origin, find_origin, make_recipe, take_name
 from signface.corpus.store import DescriptorStore, open_store, read_provenance
@@ -265,12 +265,12 @@ def test_training_and_evaluation_take_what_is_stored(tmp_path, laugh):
     entry = TakeEntry(tmp_path / "joy.csv", "S1", "EU", annotation=tmp_path / "joy.eaf")
     write_weights(made.descriptors, entry.path)
     write_eaf(made.reference, entry.annotation, signer="S1")
-    (first,) = solve_examples(Corpus(tmp_path, (entry,)))
+    (first,) = solve_corpus(Corpus(tmp_path, (entry,)))
     store = open_store(tmp_path)
     own = find_origin(entry, tmp_path, make_recipe())
     assert store.read(own).weights.tobytes() == first.descriptors.weights.tobytes()
     store.write(own, replace(first.descriptors, history=("from the store",)))
-    (second,) = solve_examples(Corpus(tmp_path, (entry,)))
+    (second,) = solve_corpus(Corpus(tmp_path, (entry,)))
     assert second.descriptors.history == ("from the store",)
     assert read_provenance(store.path(own))["origin"]["recording"] == own.recording
 
@@ -286,8 +286,8 @@ def test_a_solved_take_is_stored_exactly(mini, tmp_path):
     entry = replace(take, path=tmp_path / take.path.name, annotation=tmp_path / "reference" / take.annotation.name)
     write_takes(tmp_path, [entry])
     corpus = read_corpus(tmp_path)
-    (solved,) = solve_examples(corpus)
-    (stored,) = solve_examples(corpus)
+    (solved,) = solve_corpus(corpus)
+    (stored,) = solve_corpus(corpus)
     plain = solve(read_take(take.path), settings=SolveSettings(neutral=corpus.takes[0].neutral_s))
     for array in ("weights", "residual", "head"):
         expected = getattr(plain, array).tobytes()

@@ -12,7 +12,7 @@ import pytest
 
 from signface.annotation import annotate
 from signface.cli.main import main
-from signface.corpus.examples import solve_examples
+from signface.corpus.examples import solve_corpus
 from signface.corpus.manifest import read_corpus
 from signface.elan.document import read_document
 from signface.elan.reference import read_reference, read_tiers
@@ -23,7 +23,7 @@ from signface.files import bundled_corpus
 from signface.label.labelling import without_transitions
 from signface.label.persistence import load_model, read_card
 from signface.label.vocabulary import Vocabulary
-from signface.learn.training import train_model
+from signface.learn.training import train
 from signface.segmentation.segments import Segments
 from tests.conftest import REPOSITORY
 from tests.fixtures.elan_files import assert_valid
@@ -48,7 +48,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def examples(folder):
-    return solve_examples(read_corpus(folder), tier="brows")
+    return solve_corpus(read_corpus(folder), tier="brows")
 
 
 def test_the_rest_of_the_take_is_none(examples):
@@ -63,7 +63,7 @@ def test_the_rest_of_the_take_is_none(examples):
 
 
 def test_the_rest_of_the_take_is_unknown_where_annotation_is_sparse(folder, examples):
-    for sparse, whole in zip(solve_examples(read_corpus(folder), tier="brows", sparse=True), examples, strict=True):
+    for sparse, whole in zip(solve_corpus(read_corpus(folder), tier="brows", sparse=True), examples, strict=True):
         assert sparse.vocabulary == BROWS
         shown = whole.reference.table.query("label != 'none'").reset_index(drop=True)
         assert sparse.reference.table[list(shown)].equals(shown)
@@ -72,12 +72,12 @@ def test_the_rest_of_the_take_is_unknown_where_annotation_is_sparse(folder, exam
 def test_a_vocabulary_can_be_named_or_is_found_in_the_annotations(folder, tmp_path):
     corpus = read_corpus(folder)
     (tmp_path / "mine.txt").write_text("down\nup\nsideways\n")
-    named = solve_examples(corpus, tier="brows", vocabulary=read_vocabulary(tmp_path / "mine.txt"))
+    named = solve_corpus(corpus, tier="brows", vocabulary=read_vocabulary(tmp_path / "mine.txt"))
     assert named[0].vocabulary.values == ("down", "up", "sideways", "none")
     with pytest.raises(SignfaceError, match="not in the vocabulary"):
-        solve_examples(corpus, tier="brows", vocabulary=Vocabulary("brows", ("up",)))
+        solve_corpus(corpus, tier="brows", vocabulary=Vocabulary("brows", ("up",)))
     with pytest.raises(SignfaceError, match=r"no tier nose@M\d or nose"):
-        solve_examples(corpus, tier="nose")
+        solve_corpus(corpus, tier="nose")
     assert read_reference(next(iter(corpus)).annotation, tier="brows").table["kind"].eq("stable").all()
 
 
@@ -91,7 +91,7 @@ def test_equal_annotations_that_touch_are_one(tmp_path):
 
 
 def test_a_model_of_a_tier_writes_that_tier_and_no_affect(examples, tmp_path):
-    model = train_model(examples, quick("knn3"))
+    model = train(examples, quick("knn3"))
     annotation = annotate(examples[1].descriptors, model, channels=True)
     assert annotation.tier == "brows"
     assert "none" in set(annotation.segments.table["label"])

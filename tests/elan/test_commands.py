@@ -24,7 +24,7 @@ from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
 from signface.evaluation.corrections import changes, summarise_changes
 from signface.label.persistence import load_model, save_model
-from signface.learn.training import Example, train_model
+from signface.learn.training import Example, train
 from signface.segmentation.segments import Segments
 from signface.settings.eaf import EafOptions
 from tests.elan.test_templates import LAB, MAPPING
@@ -83,7 +83,7 @@ def machine(tmp_path) -> Path:
     """A classifier that has learnt joy as anger."""
     descriptors, truth = acted("N J N A N", seed=9)
     wrong = truth.table.assign(label=truth.table["label"].str.replace("J", "A"))
-    model = train_model([Example("old", "S9", "IE", descriptors, Segments(wrong))], quick("knn1"), name="machine")
+    model = train([Example("old", "S9", "IE", descriptors, Segments(wrong))], quick("knn1"), name="machine")
     save_model(model, tmp_path / "machine.skops")
     return tmp_path / "machine.skops"
 
@@ -109,7 +109,7 @@ def test_learning_says_so_when_it_makes_things_worse(tmp_path, capsys):
     rows = "".join(f"{name}.csv,S1,EU,{name}.eaf\n" for name in ("joy", "anger"))
     (folder / "takes.csv").write_text("take,signer,kind,annotation\n" + rows)
     descriptors, truth = acted("N J N A N", seed=9)
-    good = train_model([Example("old", "S9", "IE", descriptors, truth)], quick("knn1"), name="good")
+    good = train([Example("old", "S9", "IE", descriptors, truth)], quick("knn1"), name="good")
     save_model(good, tmp_path / "good.skops")
     arguments = ["--before", str(tmp_path / "good.skops"), "--classifier", "knn1"]
     assert main(["elan", "learn", str(folder), "-o", str(tmp_path / "mine.skops"), *arguments]) == 0

@@ -11,11 +11,11 @@ from sklearn.model_selection import GroupKFold, LeaveOneGroupOut, StratifiedKFol
 from sklearn.neighbors import KNeighborsClassifier
 
 from signface.descriptors import Descriptors
-from signface.evaluation.protocol import PROTOCOLS, evaluate, folds_of
+from signface.evaluation.protocol import PROTOCOLS, evaluate_folds, folds_of
 from signface.label.vocabulary import AFFECT
 from signface.learn.examples import Example, frame_table
 from signface.learn.folds import groups_of, inner_folds
-from signface.learn.training import train_model
+from signface.learn.training import train
 from tests.fixtures.hand_made import BASES, corpus, example
 from tests.fixtures.training import quick
 
@@ -88,21 +88,21 @@ def test_a_fingerprint_gives_a_take_away_to_who_has_seen_a_frame_of_it(prints):
 )
 def test_random_labels_are_found_by_chance_only(prints, protocol, kinds, options):
     folds = protocol_folds(prints, protocol, kinds)
-    found = evaluate(folds, quick(**options), classifiers=["knn1"]).metrics["classifiers"]["knn1"]["manual_segments"]
-    assert found["n"] == 36
-    assert found["accuracy"] < BY_CHANCE
+    scores = evaluate_folds(folds, quick(**options), classifiers=["knn1"]).metrics["classifiers"]["knn1"]
+    assert scores["manual_segments"]["n"] == 36
+    assert scores["manual_segments"]["accuracy"] < BY_CHANCE
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_random_labels_are_found_by_chance_only_by_sequence_models(prints, protocol):
-    metrics = evaluate(protocol_folds(prints, protocol, ["EU"]), classifiers=["hmm"]).metrics
+    metrics = evaluate_folds(protocol_folds(prints, protocol, ["EU"]), classifiers=["hmm"]).metrics
     assert metrics["classifiers"]["hmm"]["manual_segments"]["accuracy"] < BY_CHANCE
 
 
 def test_what_is_learnt_of_random_labels_is_not_thought_well_of(prints):
     """Scores that stand in a card come from takes left out."""
     one = [e for e in prints if e.signer == "S0"]
-    scores = train_model(one, quick("knn1", calibrate=True, folds=3)).card.scores
+    scores = train(one, quick("knn1", calibrate=True, folds=3)).card.scores
     assert max(scores.values()) < BY_CHANCE
 
 
@@ -128,8 +128,8 @@ def test_every_frame_of_a_table_knows_its_take_and_its_signer():
     where = {e.take: e.signer for e in examples}
     assert [where[take] for take in takes] == signers.tolist()
     forest = RandomForestClassifier(10, random_state=0)
-    for train, test in LeaveOneGroupOut().split(X, y, signers):
-        assert not set(takes[train]) & set(takes[test])  # thinned neighbours stand on one side
+    for trained, tested in LeaveOneGroupOut().split(X, y, signers):
+        assert not set(takes[trained]) & set(takes[tested])  # thinned neighbours stand on one side
     assert cross_val_score(forest, X, y, groups=signers, cv=LeaveOneGroupOut()).min() > 0.9
 
 

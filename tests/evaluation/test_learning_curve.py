@@ -10,7 +10,7 @@ import pytest
 from signface.evaluation.importance import mirrored_groups, permutation_importance
 from signface.evaluation.learning_curve import learning_curve, remembering
 from signface.evaluation.protocol import folds_of
-from signface.learn.training import train_model
+from signface.learn.training import train
 from tests.fixtures.hand_made import BASES, corpus
 from tests.fixtures.training import quick
 
@@ -29,7 +29,7 @@ def test_a_curve_grows_by_whole_takes_of_the_training_set_only(examples):
 
     def noting(takes, settings, **options):
         trained_on.append({e.take for e in takes})
-        return train_model(takes, settings, **options)
+        return train(takes, settings, **options)
 
     curve = learning_curve(folds(examples, "within"), classifiers=["knn1"], train=noting)
     assert {take for takes in trained_on for take in takes} == {e.take for e in examples if e.kind == "IE"}
@@ -53,7 +53,7 @@ def test_the_cost_of_a_curve_is_bounded(examples):
 
     def noting(takes, settings, **options):
         counted.append(len(takes))
-        return train_model(takes, settings, **options)
+        return train(takes, settings, **options)
 
     known = {"knn1": 1.0}
     learning_curve(folds(examples, "within"), classifiers=["knn1"], whole=known, most_takes=60, train=noting)
@@ -68,7 +68,7 @@ def test_a_curve_repeats_with_its_seed(examples):
 
         def noting(takes, settings, parts=parts, **options):
             parts.add(frozenset(e.take for e in takes))
-            return train_model(takes, settings, **options)
+            return train(takes, settings, **options)
 
         curves.append(learning_curve(folds(examples, "within"), quick(seed=seed), classifiers=["knn1"], train=noting))
         drawn.append(parts)
@@ -81,12 +81,12 @@ def test_the_same_takes_are_trained_on_once(examples):
 
     def noting(takes, settings, **options):
         calls.append(1)
-        return train_model(takes, settings, **options)
+        return train(takes, settings, **options)
 
-    train = remembering(noting)
+    remembered = remembering(noting)
     takes = [e for e in examples if e.kind == "IE"]
-    assert train(takes, quick("knn1", seed=0)) is train(takes[::-1], quick("knn1", seed=0))
-    train(takes, quick("knn3", seed=0))
+    assert remembered(takes, quick("knn1", seed=0)) is remembered(takes[::-1], quick("knn1", seed=0))
+    remembered(takes, quick("knn3", seed=0))
     assert len(calls) == 2
 
 
@@ -109,7 +109,7 @@ def test_a_base_that_tells_the_labels_apart_matters_and_noise_does_not(examples)
         return dataclasses.replace(e, descriptors=dataclasses.replace(e.descriptors, weights=weights))
 
     parts = folds([noisy(e) for e in examples], "within")
-    models = [train_model(fold.train, quick("knn1")) for fold in parts]
+    models = [train(fold.train, quick("knn1")) for fold in parts]
     table = permutation_importance(parts, models)
     lost = table.set_index("group")["accuracy_lost"]
     assert set(lost.index) == set(BASES)
@@ -120,6 +120,6 @@ def test_a_base_that_tells_the_labels_apart_matters_and_noise_does_not(examples)
 
 def test_only_what_labels_segments_by_their_means_is_asked(examples):
     parts = folds(examples, "within")
-    models = [train_model(fold.train, quick("knn1", aggregate="frames")) for fold in parts]
+    models = [train(fold.train, quick("knn1", aggregate="frames")) for fold in parts]
     with pytest.raises(ValueError, match="by their means"):
         permutation_importance(parts, models)

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.evaluation import protocol as protocol_module
-from signface.evaluation.protocol import PROTOCOLS, Fold, evaluate, folds_of, most_overlapping
+from signface.evaluation.protocol import PROTOCOLS, Fold, evaluate_folds, folds_of, most_overlapping
 from signface.label.vocabulary import AFFECT
-from signface.learn.training import train_model
+from signface.learn.training import train
 from signface.settings.choices import NAMES
 from tests.fixtures.hand_made import BASES, corpus, example
 
@@ -56,10 +56,10 @@ def test_training_is_given_the_training_takes_and_nothing_else(examples, monkeyp
 
     def noting(takes, settings, **options):
         trained_on.extend(takes)
-        return train_model(takes, settings, **options)
+        return train(takes, settings, **options)
 
-    monkeypatch.setattr(protocol_module, "train_model", noting)
-    evaluate(folds(examples), classifiers=["knn1"])
+    monkeypatch.setattr(protocol_module, "train", noting)
+    evaluate_folds(folds(examples), classifiers=["knn1"])
     assert {e.kind for e in trained_on} == {"IE"}
     assert not {e.take for e in trained_on} & {e.take for e in examples if e.kind == "EU"}
 
@@ -72,9 +72,11 @@ def test_answers_do_not_depend_on_the_references_of_the_test_takes(examples):
         table = e.reference.table.assign(label=[other.get(label, label) for label in e.reference.table.label])
         return dataclasses.replace(e, reference=e.reference.changed("turned", table))
 
-    right = evaluate(folds(examples), classifiers=["forest"]).metrics["classifiers"]["forest"]["manual_segments"]
     turned_round = [turned(e) if e.kind == "EU" else e for e in examples]
-    wrong = evaluate(folds(turned_round), classifiers=["forest"]).metrics["classifiers"]["forest"]["manual_segments"]
+    right, wrong = (
+        evaluate_folds(folds(takes), classifiers=["forest"]).metrics["classifiers"]["forest"]["manual_segments"]
+        for takes in (examples, turned_round)
+    )
     assert np.sum(right["confusion"], axis=0).tolist() == np.sum(wrong["confusion"], axis=0).tolist()
     assert right["accuracy"] > 0.95
     assert wrong["accuracy"] < 0.05
@@ -82,7 +84,7 @@ def test_answers_do_not_depend_on_the_references_of_the_test_takes(examples):
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_metrics_have_the_agreed_form(examples, protocol):
-    metrics = evaluate(folds(examples, protocol)).metrics
+    metrics = evaluate_folds(folds(examples, protocol)).metrics
     assert set(metrics["segmentation"]) >= {"boundary_f1", "mean_iou", "frame_agreement"}
     assert "0.10" in metrics["segmentation"]["boundary_f1"]
     assert list(metrics["classifiers"]) == list(NAMES)
@@ -102,12 +104,12 @@ def test_noise_in_place_of_faces_is_not_told_apart(examples):
         )
         for e in examples
     ]
-    scores = evaluate(folds(noisy), classifiers=["knn3"]).metrics["classifiers"]["knn3"]["manual_segments"]
+    scores = evaluate_folds(folds(noisy), classifiers=["knn3"]).metrics["classifiers"]["knn3"]["manual_segments"]
     assert scores["accuracy"] < scores["majority"] + 0.1
 
 
 def test_signers_are_scored_one_by_one(examples):
-    found = evaluate(folds(examples), classifiers=["knn1"])
+    found = evaluate_folds(folds(examples), classifiers=["knn1"])
     counts = [found.by_signer[s]["knn1"]["manual_segments"]["n"] for s in ("S1", "S2")]
     assert sum(counts) == found.metrics["classifiers"]["knn1"]["manual_segments"]["n"]
 
@@ -133,7 +135,7 @@ def test_a_kind_that_is_trained_on_and_tested_is_tested_in_turns(examples):
         assert {e.take for e in fold.train if e.kind == "IE"} == {
             e.take for e in examples if e.kind == "IE" and e.signer == fold.signer
         }
-    scores = evaluate(found, classifiers=["knn1"]).metrics["classifiers"]["knn1"]["manual_segments"]
+    scores = evaluate_folds(found, classifiers=["knn1"]).metrics["classifiers"]["knn1"]["manual_segments"]
     assert scores["n"] == sum(len(e.stable) for e in examples if e.kind == "EU")
 
 

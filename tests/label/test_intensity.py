@@ -21,14 +21,14 @@ from signface.corpus.manifest import TakeEntry, write_takes
 from signface.descriptors_files import write_weights
 from signface.elan.reference import read_reference
 from signface.elan.writing import write_eaf
-from signface.evaluation.protocol import evaluate, folds_of
+from signface.evaluation.protocol import evaluate_folds, folds_of
 from signface.label.intensity import INTENSITIES
 from signface.label.persistence import load_model, save_model
 from signface.label.spans import segment_means
 from signface.learn.examples import Example
 from signface.learn.intensity import train_intensity
 from signface.learn.ordinal import OrdinalClassifier, ordinal_metrics
-from signface.learn.training import train_model
+from signface.learn.training import train
 from signface.segmentation.segments import Segments
 from tests.fixtures.hand_made import BASES, FACES, moving_face
 from tests.fixtures.training import quick
@@ -116,14 +116,14 @@ def test_the_lines_kept_say_what_the_classifiers_behind_them_say(takes):
 def test_without_enough_intensities_there_is_none_to_learn(takes):
     plain = [dataclasses.replace(e, reference=Segments(e.reference.table.drop(columns="intensity"))) for e in takes]
     assert train_intensity(plain) is None
-    assert train_model(plain, quick("knn1")).intensity is None
+    assert train(plain, quick("knn1")).intensity is None
     assert train_intensity(takes[:3]) is None
     flat = [dataclasses.replace(e, reference=Segments(e.reference.table.assign(intensity=2))) for e in takes]
     assert train_intensity(flat) is None
 
 
 def test_a_model_keeps_its_intensities_on_disk_and_annotates_them(takes, tmp_path):
-    model = train_model(takes, quick("knn3"))
+    model = train(takes, quick("knn3"))
     save_model(model, tmp_path / "m.skops")
     loaded = load_model(tmp_path / "m.skops")
     unseen = graded("new", 98).descriptors
@@ -159,7 +159,7 @@ def test_annotate_writes_what_the_classifier_has_learnt_into_the_tier_of_intensi
 def test_an_evaluation_holds_what_was_learnt_beside_the_rule(takes):
     tested = [graded(f"e{n}", 50 + n, kind="EU") for n in range(3)]
     folds = folds_of([*takes, *tested], protocol="within", train_kinds=["IE"], test_kinds=["EU"])
-    scores = evaluate(folds, classifiers=["knn1"]).metrics["intensity"]
+    scores = evaluate_folds(folds, classifiers=["knn1"]).metrics["intensity"]
     assert scores["learnt"]["n"] == scores["rule"]["n"] == 9
     assert scores["learnt"]["exact"] == 1
     assert scores["rule"]["exact"] < 1

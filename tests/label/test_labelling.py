@@ -15,7 +15,7 @@ from signface.errors import SignfaceError
 from signface.label.labelling import label_segments
 from signface.label.spans import segment_means
 from signface.label.vocabulary import AFFECT
-from signface.learn.training import train_model
+from signface.learn.training import train
 from signface.segmentation.cutting import segment
 from signface.segmentation.segments import Segments
 from tests.fixtures.hand_made import BASES, FACES, corpus, example, moving_face
@@ -24,7 +24,7 @@ from tests.fixtures.training import quick
 
 @pytest.fixture(scope="module")
 def model():
-    return train_model([e for e in corpus() if e.kind == "IE"], quick("knn3"), name="toy")
+    return train([e for e in corpus() if e.kind == "IE"], quick("knn3"), name="toy")
 
 
 def labelled(descriptors, model):

@@ -23,7 +23,7 @@ from signface.label.labelling import find_segments
 from signface.label.persistence import CARD, load_model, read_card, save_model
 from signface.label.skops_archive import RENAMED_ATTRIBUTES, RENAMED_MODULES, without_padding
 from signface.label.vocabulary import AFFECT
-from signface.learn.training import train_model
+from signface.learn.training import train
 from signface.settings.choices import NAMES
 from tests.fixtures.hand_made import corpus, example
 from tests.fixtures.training import quick
@@ -37,13 +37,13 @@ def takes():
 @pytest.fixture(scope="module")
 def saved(takes, tmp_path_factory):
     file = tmp_path_factory.mktemp("models") / "toy.skops"
-    save_model(train_model(takes, quick("knn1"), corpus="toy", scores={"of a test": 0.5}), file)
+    save_model(train(takes, quick("knn1"), corpus="toy", scores={"of a test": 0.5}), file)
     return file
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_loaded_model_answers_like_the_saved_one(name, takes, tmp_path):
-    model = train_model(takes, quick(name), corpus="toy", scores={"of a test": 0.5})
+    model = train(takes, quick(name), corpus="toy", scores={"of a test": 0.5})
     file = tmp_path / f"{name}.skops"
     save_model(model, file)
     loaded = load_model(file)
@@ -56,13 +56,13 @@ def test_a_loaded_model_answers_like_the_saved_one(name, takes, tmp_path):
 TRAIN = """
 import sys
 from signface.label.persistence import save_model
-from signface.learn.training import train_model
+from signface.learn.training import train
 from signface.label.vocabulary import AFFECT
 from tests.fixtures.hand_made import corpus
 from tests.fixtures.training import quick
 takes = [e for e in corpus(("S1",)) if e.kind == "IE"]
 for name in ("knn3", "svm-linear", "svm-rbf", "forest"):
-    save_model(train_model(takes, quick(name, seed=1)), f"{sys.argv[1]}/{name}.skops")
+    save_model(train(takes, quick(name, seed=1)), f"{sys.argv[1]}/{name}.skops")
 """
 
 
@@ -154,7 +154,7 @@ def test_a_card_of_before_vocabularies_is_of_affect(saved, tmp_path):
 
 def test_a_skops_file_of_another_tool_is_refused(takes, tmp_path):
     file = tmp_path / "other.skops"
-    skops.io.dump(train_model(takes, quick("knn1")).estimator, file)
+    skops.io.dump(train(takes, quick("knn1")).estimator, file)
     with pytest.raises(SignfaceError, match="has no card"):
         load_model(file)
 
@@ -222,7 +222,7 @@ def test_a_file_of_an_older_version_answers_like_todays(classifier, tmp_path):
     intensity = IntensityClassifier()
     intensity.bases_, intensity.levels_ = tuple(takes[0].descriptors.names), np.array([1, 2, 3])
     intensity.lines_ = np.array([[2.0, -1.0], [2.0, -3.0]])
-    model = replace(train_model(takes, quick(classifier)), intensity=intensity)
+    model = replace(train(takes, quick(classifier)), intensity=intensity)
     as_before(model, tmp_path / "old.skops")
     save_model(model, tmp_path / "today.skops")
     old, today = load_model(tmp_path / "old.skops"), load_model(tmp_path / "today.skops")

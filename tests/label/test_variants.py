@@ -13,11 +13,11 @@ from signface.descriptors import Descriptors
 from signface.descriptors_files import read_weights, write_weights
 from signface.elan.reference import read_reference
 from signface.errors import SignfaceError
-from signface.evaluation.protocol import evaluate, folds_of
+from signface.evaluation.protocol import evaluate_folds, folds_of
 from signface.label.labelling import find_segments, label_spans
 from signface.label.persistence import load_model, save_model
 from signface.label.variants import DescriptorVariant
-from signface.learn.training import train_model
+from signface.learn.training import train
 from signface.signer import signer_level
 from tests.fixtures.hand_made import BASES, corpus, example
 from tests.fixtures.training import quick
@@ -114,7 +114,7 @@ def test_unknown_variants_are_refused(features, normalise, problem):
 def test_a_saved_model_makes_its_variant_of_what_it_annotates(tmp_path, aggregate):
     takes = [e for e in corpus() if e.kind == "IE"]
     options = {"features": ("weights", "windows"), "normalise": "signer", "aggregate": aggregate, "balanced": True}
-    model = train_model(takes, quick("knn3", **options))
+    model = train(takes, quick("knn3", **options))
     save_model(model, tmp_path / "m.skops")
     loaded = load_model(tmp_path / "m.skops")
     assert loaded.card == model.card
@@ -133,15 +133,15 @@ def test_a_saved_model_makes_its_variant_of_what_it_annotates(tmp_path, aggregat
 def test_a_sequence_model_takes_no_other_features():
     takes = [e for e in corpus() if e.kind == "IE"]
     with pytest.raises(SignfaceError, match="its own features"):
-        train_model(takes, quick("hmm", features=("weights", "windows")))
+        train(takes, quick("hmm", features=("weights", "windows")))
 
 
 def test_an_evaluation_normalises_signers_by_their_test_takes():
     examples = corpus()
     folds = folds_of(examples, protocol="across", train_kinds=["IE"], test_kinds=["EU"])
     training = {"normalise": "signer", "aggregate": "frames"}
-    table = evaluate(folds, quick(**training), classifiers=["forest"]).tables["forest"]["manual_segments"]
-    model = train_model(folds[0].train, quick("forest", **training))
+    table = evaluate_folds(folds, quick(**training), classifiers=["forest"]).tables["forest"]["manual_segments"]
+    model = train(folds[0].train, quick("forest", **training))
     level = signer_level([e.descriptors for e in folds[0].test])
     tested = folds[0].test[0]
     spans = tested.stable[["start_s", "end_s"]].to_numpy()
@@ -152,7 +152,7 @@ def test_an_evaluation_normalises_signers_by_their_test_takes():
 
 def test_annotate_normalises_by_all_takes_that_it_is_given(tmp_path):
     takes = [e for e in corpus() if e.kind == "IE"]
-    save_model(train_model(takes, quick("forest", normalise="signer")), tmp_path / "m.skops")
+    save_model(train(takes, quick("forest", normalise="signer")), tmp_path / "m.skops")
     unseen = [
         example(labels, seed=n, take=f"t{n}") for n, labels in enumerate((["N", "J", "N"], ["N", "A", "N", "Su"]))
     ]

@@ -9,13 +9,13 @@ import pandas as pd
 import pytest
 
 from signface.errors import SignfaceError
-from signface.evaluation.measure import measure
+from signface.evaluation.measure import evaluate
 from signface.label.labellers import SEQUENCE_NAMES
 from signface.label.labelling import find_segments, without_transitions
 from signface.label.persistence import load_model, read_card, save_model
 from signface.label.vocabulary import AFFECT, Vocabulary
 from signface.learn.examples import Example, common_vocabulary
-from signface.learn.training import train_model
+from signface.learn.training import train
 from signface.segmentation.segments import Segments, value_at
 from tests.fixtures.hand_made import corpus
 from tests.fixtures.training import quick
@@ -43,8 +43,7 @@ def examples():
 @pytest.mark.parametrize("classifier", ["knn3", "forest", *(name for name in SEQUENCE_NAMES if name != "gru")])
 def test_every_classifier_learns_a_tier_without_transitions(examples, classifier, tmp_path):
     parameters = {"iterations": 25} if classifier == "crf" else {}
-    train = [e for e in examples if e.signer == "S1"]
-    model = train_model(train, quick(classifier, parameters=parameters))
+    model = train([e for e in examples if e.signer == "S1"], quick(classifier, parameters=parameters))
     assert set(model.card.labels) == set(BROWS.values)
     assert (model.card.vocabulary, model.card.tier) == (BROWS, "brows")
     right = total = 0
@@ -64,7 +63,7 @@ def test_every_classifier_learns_a_tier_without_transitions(examples, classifier
 
 
 def test_chance_and_labels_are_those_of_the_vocabulary(examples):
-    metrics = measure(examples, quick(), protocols=["within"], train_kinds=["IE"], classifiers=["knn1"]).metrics
+    metrics = evaluate(examples, quick(), protocols=["within"], train_kinds=["IE"], classifiers=["knn1"]).metrics
     scores = metrics["classifiers"]["knn1"]
     for section in ("manual_segments", "automatic_segments", "frames"):
         assert scores[section]["labels"] == list(BROWS.values)
@@ -77,7 +76,7 @@ def test_chance_and_labels_are_those_of_the_vocabulary(examples):
 def test_the_order_of_the_vocabulary_changes_only_the_order(examples):
     turned = dataclasses.replace(BROWS, values=BROWS.values[::-1])
     other = [dataclasses.replace(example, vocabulary=turned) for example in examples]
-    one, two = (measure(e, quick(), protocols=["within"], classifiers=["forest"]).metrics for e in (examples, other))
+    one, two = (evaluate(e, quick(), protocols=["within"], classifiers=["forest"]).metrics for e in (examples, other))
     for section in ("manual_segments", "automatic_segments", "frames"):
         first, second = (metrics["classifiers"]["forest"][section] for metrics in (one, two))
         assert np.array_equal(first["confusion"], np.array(second["confusion"])[::-1, ::-1])
@@ -90,9 +89,9 @@ def test_the_order_of_the_vocabulary_changes_only_the_order(examples):
 def test_what_is_not_annotated_is_unknown_where_annotation_is_sparse():
     vocabulary = Vocabulary("brows", ("raised", "lowered"))
     sparse = [on_brows(example, sparse=True, vocabulary=vocabulary) for example in corpus()]
-    model = train_model(sparse, quick("knn3"))
+    model = train(sparse, quick("knn3"))
     assert model.card.labels == ("lowered", "raised")
-    metrics = measure(sparse, quick(), protocols=["within"], classifiers=["knn3"]).metrics
+    metrics = evaluate(sparse, quick(), protocols=["within"], classifiers=["knn3"]).metrics
     frames = metrics["classifiers"]["knn3"]["frames"]
     annotated = sum(e.stable.eval("end_s - start_s").sum() for e in sparse if e.kind == "EU")
     assert frames["n"] == pytest.approx(25 * annotated, rel=0.1)
@@ -125,7 +124,7 @@ def test_takes_of_two_tiers_are_not_mixed(examples):
     with pytest.raises(SignfaceError, match="other vocabularies"):
         common_vocabulary([examples[0], corpus()[1]])
     with pytest.raises(SignfaceError, match="other vocabularies"):
-        train_model([examples[0], corpus()[1]], quick("knn1"))
+        train([examples[0], corpus()[1]], quick("knn1"))
 
 
 def test_a_label_outside_the_vocabulary_is_refused(examples):

@@ -15,7 +15,7 @@ from signface.errors import SignfaceError
 from signface.label.labellers import make_labeller
 from signface.label.labelling import label_spans
 from signface.learn.examples import Example, training_frames
-from signface.learn.training import train_model
+from signface.learn.training import train
 from signface.segmentation.segments import Segments
 from signface.settings.choices import NAMES, SEQUENCE_NAMES
 from signface.settings.solve import SolveSettings
@@ -37,7 +37,7 @@ def test_labellers_are_estimators_that_clone(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_labellers_tell_distinct_faces_apart_and_say_how_sure_they_are(name, takes):
-    model = train_model(takes, quick(name))
+    model = train(takes, quick(name))
     unseen = example(["N", "J", "A", "Su", "Sa", "F", "D"], seed=999)
     labels, confidences = label_spans(unseen.descriptors, unseen.stable[["start_s", "end_s"]].to_numpy(), model)
     assert labels == unseen.stable["label"].tolist()
@@ -86,7 +86,7 @@ def test_frames_without_weights_are_not_trained_on():
 
 def test_the_order_of_the_takes_does_not_matter(takes):
     unseen = example(["N", "J", "A", "Su"], seed=5).descriptors.weights
-    one, other = train_model(takes, quick()), train_model(takes[::-1], quick())
+    one, other = train(takes, quick()), train(takes[::-1], quick())
     np.testing.assert_array_equal(one.probabilities(unseen), other.probabilities(unseen))
     assert one.card == other.card
 
@@ -104,18 +104,18 @@ def test_takes_may_list_their_bases_in_other_orders(takes):
         for e in takes[1:]
     ]
     unseen = example(["N", "J", "A", "Su"], seed=5).descriptors.weights
-    one, other = train_model(takes, quick("knn1")), train_model([takes[0], *shuffled], quick("knn1"))
+    one, other = train(takes, quick("knn1")), train([takes[0], *shuffled], quick("knn1"))
     np.testing.assert_array_equal(one.probabilities(unseen), other.probabilities(unseen))
 
 
 def test_takes_of_other_faces_are_not_mixed(takes):
     stranger = Descriptors(takes[0].descriptors.weights, [f"other{i}" for i in range(len(BASES))], 100)
     with pytest.raises(SignfaceError, match="other bases"):
-        train_model([*takes, Example("x", "S3", "IE", stranger, takes[0].reference)], quick())
+        train([*takes, Example("x", "S3", "IE", stranger, takes[0].reference)], quick())
 
 
 def test_the_card_says_what_the_model_was_trained_on(takes):
-    card = train_model(takes, quick("knn3", seed=7), corpus="toy", solve=SolveSettings(alpha=0.3)).card
+    card = train(takes, quick("knn3", seed=7), corpus="toy", solve=SolveSettings(alpha=0.3)).card
     assert (card.classifier, card.corpus, card.face, card.seed) == ("knn3", "toy", "default", 7)
     assert SolveSettings.from_dict(card.solve) == SolveSettings(alpha=0.3)
     assert (card.signers, card.kinds, card.bases) == (("S1", "S2"), ("IE",), BASES)
@@ -126,7 +126,7 @@ def test_the_card_says_what_the_model_was_trained_on(takes):
 @pytest.mark.parametrize(("labels", "problem"), [([], "no annotated take"), (["N"], "1 label,")])
 def test_too_little_to_train_on_is_said(labels, problem):
     with pytest.raises(SignfaceError, match=problem):
-        train_model([example(labels)] if labels else [], quick())
+        train([example(labels)] if labels else [], quick())
 
 
 def test_a_label_outside_the_vocabulary_is_named():
@@ -144,7 +144,7 @@ def test_a_reference_without_labels_is_refused():
 
 
 def test_left_out_takes_are_scored_and_noise_scores_near_chance(takes):
-    score, _ = train_model(takes, quick("knn3", calibrate=True)).card.scores.values()
+    score, _ = train(takes, quick("knn3", calibrate=True)).card.scores.values()
     assert score > 0.95
     rng = np.random.default_rng(0)
     noisy = [
@@ -157,13 +157,13 @@ def test_left_out_takes_are_scored_and_noise_scores_near_chance(takes):
         )
         for e in takes
     ]
-    score, _ = train_model(noisy, quick("knn3", calibrate=True)).card.scores.values()
+    score, _ = train(noisy, quick("knn3", calibrate=True)).card.scores.values()
     assert score < 0.75  # neutral is 60 % of the segments
 
 
 def test_the_card_says_the_settings_as_they_were_chosen(takes):
     settings = quick("knn3", normalise="signer", seed=3)
-    card = train_model(takes, settings).card
+    card = train(takes, settings).card
     assert TrainingSettings.from_dict(card.training) == settings
     assert (card.classifier, card.normalise, card.seed) == ("knn3", "signer", 3)
 

@@ -13,7 +13,7 @@ from signface.errors import SignfaceError
 from signface.label.calibration import brier_score, calibrated, expected_calibration_error, fit_calibration
 from signface.label.labellers import make_labeller
 from signface.label.labelling import find_segments
-from signface.learn.training import train_model
+from signface.learn.training import train
 from signface.learn.tuning import GRIDS
 from signface.settings.choices import NAMES, SEQUENCE_NAMES
 from tests.fixtures.hand_made import corpus, example
@@ -74,7 +74,7 @@ def test_errors_of_confidences_are_shares_and_do_not_depend_on_the_order(items):
 
 def test_labels_do_not_change_when_confidences_are_calibrated():
     takes = [e for e in corpus() if e.kind == "IE"]
-    model = train_model(takes, quick("forest"))
+    model = train(takes, quick("forest"))
     unseen = example(["N", "J", "A", "Su", "N"], seed=9).descriptors
     line = dataclasses.replace(model.card, calibration={"slope": 0.5, "offset": -0.5})
     before, after = (find_segments(unseen, m).table for m in (model, dataclasses.replace(model, card=line)))
@@ -106,20 +106,20 @@ def test_a_search_finds_the_parameter_that_works(monkeypatch):
     """At C = 0.0001 a machine calls everything neutral; a search must not choose it."""
     takes = [e for e in corpus(hold=0.4) if e.kind == "IE"]
     monkeypatch.setitem(GRIDS, "svm-linear", {"C": [0.0001, 1.0]})
-    model = train_model(takes, quick("svm-linear", search=True, folds=2))
+    model = train(takes, quick("svm-linear", search=True, folds=2))
     assert model.card.parameters == {"C": 1.0}
 
 
 def test_a_sequence_model_is_searched_too():
     takes = [e for e in corpus(("S1",), hold=0.6) if e.kind == "IE"]
-    model = train_model(takes, quick("hmm", search=True, folds=2))
+    model = train(takes, quick("hmm", search=True, folds=2))
     assert set(model.card.parameters) == set(GRIDS["sequence"])
     assert model.estimator.get_params()["rarity"] == model.card.parameters["rarity"]
 
 
 def test_one_take_cannot_be_searched_over():
     with pytest.raises(SignfaceError, match="too few training takes"):
-        train_model([example(["N", "J", "A"])], quick(search=True))
+        train([example(["N", "J", "A"])], quick(search=True))
 
 
 def test_balanced_training_finds_more_of_what_is_rare():
@@ -132,7 +132,5 @@ def test_balanced_training_finds_more_of_what_is_rare():
         takes.append(dataclasses.replace(one, descriptors=dataclasses.replace(one.descriptors, weights=weights)))
     frames = np.random.default_rng(1).normal(0.1, 0.15, (400, 12))
     for name in ("svm-linear", "forest", "knn3"):
-        share = [
-            np.mean(train_model(takes, quick(name, balanced=b)).estimator.predict(frames) == "A") for b in (False, True)
-        ]
+        share = [np.mean(train(takes, quick(name, balanced=b)).estimator.predict(frames) == "A") for b in (False, True)]
         assert share[1] > share[0]

@@ -13,12 +13,12 @@ import pytest
 from lxml import etree
 
 from signface.descriptors import Descriptors
-from signface.evaluation.measure import measure
+from signface.evaluation.measure import evaluate
 from signface.face.reading import read_face
 from signface.label.vocabulary import AFFECT
 from signface.report.evaluation.evaluated import Evaluated
 from signface.report.evaluation.importance import draw_importance, skin_values
-from signface.report.evaluation.report import draw_all, write_report
+from signface.report.evaluation.report import draw_all, write_files
 from signface.report.evaluation.words import headline, limits, training_words
 from signface.segmentation.segments import Segments
 from tests.fixtures.hand_made import corpus
@@ -48,7 +48,7 @@ def facts(examples, *, synthetic=True):
 
 
 def evaluated(examples, *, protocols=("within", "across"), classifiers=("knn1", "knn3"), date=None):
-    metrics, found = measure(
+    metrics, found = evaluate(
         examples, protocols=protocols, train_kinds=["IE"], test_kinds=["EU"], classifiers=classifiers
     )
     return Evaluated(metrics, facts(examples), examples, found, read_face("default"), date)
@@ -66,7 +66,7 @@ def both():
 @pytest.fixture(scope="module")
 def folder(both, tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
-    write_report(both, folder)
+    write_files(both, folder)
     return folder
 
 
@@ -165,7 +165,7 @@ def test_pictures_have_descriptions_and_are_files_too(page, folder):
 
 def test_the_same_evaluation_gives_the_same_bytes(both, folder, tmp_path):
     again = evaluated(both.examples, date="22 November 2026")
-    write_report(again, tmp_path)
+    write_files(again, tmp_path)
     written = sorted(path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
     assert written == sorted(path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file())
     assert [path for path in written if (folder / path).read_bytes() != (tmp_path / path).read_bytes()] == []
@@ -191,7 +191,7 @@ def test_one_signer_and_a_take_in_which_nothing_is_found(tmp_path):
         short, descriptors=Descriptors(np.zeros((2, 12)), short.descriptors.names, 100.0)
     )  # too short for an energy curve
     one = dataclasses.replace(one, examples=[cut if e is short else e for e in one.examples])
-    page = write_report(one, tmp_path).read_text(encoding="utf-8")
+    page = write_files(one, tmp_path).read_text(encoding="utf-8")
     assert "One signer was tested" in page
     assert "no stable segment found for 3 in the reference" in page
     assert "There is one classifier only" in page

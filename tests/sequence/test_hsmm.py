@@ -15,7 +15,7 @@ from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.label.labelling import find_segments, label_spans
 from signface.label.persistence import load_model, save_model
-from signface.learn.training import train_model
+from signface.learn.training import train
 from signface.metrics.segmentation import boundary_f1
 from signface.sequence.hsmm import make_sequence_labeller
 from signface.sequence.semi_markov import SegmentModel
@@ -32,9 +32,7 @@ def takes():
 @pytest.fixture(scope="module", params=list(SEQUENCE_NAMES))
 def model(request, takes):
     fewer = {"gru": {"networks": 1, "effort": 90.0}}
-    return train_model(
-        [e for e in takes if e.signer == "S1"], quick(request.param, parameters=fewer.get(request.param, {}))
-    )
+    return train([e for e in takes if e.signer == "S1"], quick(request.param, parameters=fewer.get(request.param, {})))
 
 
 def test_boundaries_and_labels_of_another_signer_are_found(model, takes):
@@ -111,14 +109,14 @@ def test_sequence_models_are_estimators_that_clone(name):
 
 @pytest.mark.parametrize("name", ["net-hsmm", "crf"])
 def test_neither_a_second_training_nor_the_order_of_takes_changes_anything(name, takes):
-    first, second = (train_model(order, quick(name, seed=1)) for order in (takes[:6], takes[5::-1]))
+    first, second = (train(order, quick(name, seed=1)) for order in (takes[:6], takes[5::-1]))
     one = takes[8].descriptors
     assert find_segments(one, first).table.equals(find_segments(one, second).table)
 
 
 def test_a_corpus_of_one_expression_is_refused():
     with pytest.raises(SignfaceError, match="two expressions"):
-        train_model([example(["N"])], quick("hmm"))
+        train([example(["N"])], quick("hmm"))
     with pytest.raises(SignfaceError, match="no sequence model"):
         make_sequence_labeller("hsmm")
 

@@ -17,7 +17,7 @@ from lxml import etree
 from signface.annotation import annotate
 from signface.cli.main import main
 from signface.cli.options import settings_from
-from signface.corpus.examples import solve_examples
+from signface.corpus.examples import solve_corpus
 from signface.corpus.levels import learn_signers
 from signface.corpus.manifest import TakeEntry, read_corpus, write_takes
 from signface.elan.recogniser import read_parameters
@@ -25,7 +25,7 @@ from signface.elan.reference import read_reference
 from signface.files import bundled_corpus
 from signface.label.persistence import load_model, save_model
 from signface.learn.examples import signer_levels
-from signface.learn.training import train_model
+from signface.learn.training import train
 from signface.settings.eaf import EafOptions
 from signface.settings.laboratory import read_settings
 from signface.settings.solve import SolveSettings
@@ -141,8 +141,8 @@ def laboratory(tmp_path_factory):
         (folder / name).write_bytes((bundled_corpus() / name).read_bytes())
     write_takes(folder, [TakeEntry(folder / name, "M2", "EU") for name in ("M2_EU_04.c3d", "M2_SE_A.c3d")])
     settings = SolveSettings(alpha=0.4, cutoff_hz=9.0)
-    examples = solve_examples(mini, settings=settings)
-    model = train_model(
+    examples = solve_corpus(mini, settings=settings)
+    model = train(
         examples,
         TrainingSettings(normalise="signer", calibrate=False),
         solve=settings,
@@ -239,7 +239,7 @@ def test_a_signers_bases_count_at_every_door(laboratory, tmp_path):
     (folder / "signers" / "M2.csv").write_bytes(file.read_bytes())
     (folder / "t.eaf").write_bytes((bundled_corpus() / "reference" / "M2_EU_04.eaf").read_bytes())
     write_takes(folder, [TakeEntry(folder / "t.c3d", "M2", "EU", annotation=folder / "t.eaf")])
-    (example,) = solve_examples(read_corpus(folder))
+    (example,) = solve_corpus(read_corpus(folder))
     np.testing.assert_allclose(example.descriptors.weights, with_bases.weights, rtol=0, atol=1e-9)
 
 
@@ -266,9 +266,9 @@ def test_the_level_of_a_corpuss_signer_counts_where_its_takes_are_learnt_from(la
     (folder / "t.c3d").write_bytes((laboratory / "M2_EU_04.c3d").read_bytes())
     (folder / "t.eaf").write_bytes((bundled_corpus() / "reference" / "M2_EU_04.eaf").read_bytes())
     write_takes(folder, [TakeEntry(folder / "t.c3d", "M2", "EU", annotation=folder / "t.eaf")])
-    (alone,) = solve_examples(read_corpus(folder))
+    (alone,) = solve_corpus(read_corpus(folder))
     (folder / "signers" / "M2.json").write_bytes((laboratory / "M2.json").read_bytes())
-    (known,) = solve_examples(read_corpus(folder))
+    (known,) = solve_corpus(read_corpus(folder))
     level = Signer.read(laboratory / "M2.json").level
     assert alone.level is None
     np.testing.assert_array_equal(signer_levels([known])["M2"].mean, level.mean)

@@ -1,18 +1,23 @@
 """The report of an evaluation: a page that needs nothing else, with its figures and tables as files beside it.
 
-- `write_report`: the whole folder.
+- `write_report`: the whole folder; `write_files`, of an `Evaluated`.
 - `evaluation_page`: the page alone, as text.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
+from signface.corpus.facts import corpus_facts
+from signface.corpus.manifest import Corpus
+from signface.evaluation.measure import Measured
+from signface.face.reading import read_face
 from signface.files import whole_file
 from signface.learn.examples import Example
 from signface.metrics.segmentation import match_boundaries
@@ -22,13 +27,33 @@ from signface.report.evaluation.importance import draw_importance
 from signface.report.evaluation.page import evaluation_page
 from signface.report.evaluation.worst_takes import FAR_S, TakeVerdict
 from signface.report.figure_files import save_vector
-
-if TYPE_CHECKING:
-    pass
+from signface.settings.solve import SolveSettings
 
 
-def write_report(evaluated: Evaluated, folder: Path) -> Path:
-    """Write `report.html`, `metrics.json`, the tables as CSV and the figures as SVG and PDF.
+def write_report(
+    measured: Measured,
+    examples: Sequence[Example],
+    corpus: Corpus,
+    folder: str | PathLike[str],
+    *,
+    settings: SolveSettings | None = None,
+    date: str | None = None,
+) -> Path:
+    """Write the report of an evaluation: `report.html`, `metrics.json`, tables as CSV, figures as SVG and PDF.
+
+    Parameters
+    ----------
+    measured : Measured
+        What `signface.evaluate` gave.
+    examples : sequence of Example
+        What it was given.
+    corpus : Corpus
+        Where they come from.
+    folder : path
+    settings : SolveSettings, optional
+        How they were solved.
+    date : str, optional
+        A date to print; without one, the same evaluation gives the same bytes.
 
     Returns
     -------
@@ -39,7 +64,28 @@ def write_report(evaluated: Evaluated, folder: Path) -> Path:
     ------
     SignfaceError
         The folder cannot be written.
+
+    See Also
+    --------
+    signface.evaluate : what is reported.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> examples = sf.datasets.mini_examples()
+    >>> measured = sf.evaluate(examples, classifiers=["knn1"], protocols=["across"])
+    >>> write_report(measured, examples, sf.datasets.mini_corpus(), "report").name
+    'report.html'
     """
+    settings = settings or SolveSettings()
+    facts = corpus_facts(corpus, settings=settings)
+    face = read_face(settings.face) if facts["faces"] else None
+    metrics = {**measured.metrics, "corpus": facts}
+    return write_files(Evaluated(metrics, facts, examples, measured.segments, face, date), Path(folder))
+
+
+def write_files(evaluated: Evaluated, folder: Path) -> Path:
+    """Write all files of a report, and give its page; see `write_report`."""
     with whole_file(folder / "metrics.json") as temporary:
         text = json.dumps(evaluated.metrics, indent=1, ensure_ascii=False) + "\n"
         temporary.write_text(text, encoding="utf-8")

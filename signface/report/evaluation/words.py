@@ -194,7 +194,7 @@ def training_words(training: Mapping[str, Any]) -> str:
     Parameters
     ----------
     training : mapping
-        The entry `training` of a protocol: what `signface.learn.training.train_model` was told.
+        The entry `training` of a protocol: what `signface.learn.training.train` was told.
     """
     words = []
     features = list(training.get("features", ["weights"]))
