@@ -53,6 +53,11 @@ def add_render_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--yaw", type=float, default=0.0, metavar="DEGREES", help="90 shows the left profile (default 0)"
     )
+    parser.add_argument(
+        "--head",
+        action=argparse.BooleanOptionalAction,
+        help="turn the head as the signer did (default: where that is known; a study says it under [render])",
+    )
     parser.add_argument("--markers", action="store_true", help="draw the layout's markers on the skin")
     parser.add_argument("--wireframe", action="store_true", help="draw the edges of the triangles")
     add_settings_arguments(parser, SolveSettings, without=("method", "alpha"))
@@ -88,6 +93,8 @@ def _render_study(folder: Path, arguments: argparse.Namespace) -> None:
     from signface.study.design import read_study
     from signface.study.films.stimuli import make_synthetic_takes, plan_films, render_study
 
+    if arguments.head is not None:
+        raise SignfaceError("--head and --no-head are for takes and weights files", hint="a study's [render] says head")
     study = read_study(folder, films=False)
 
     def make_takes(place: Path, signer: int) -> None:
@@ -139,33 +146,42 @@ def _write_film(
     source: Path, suffix: str, shown: dict[str, Descriptors], avatar: Avatar, arguments: argparse.Namespace
 ) -> None:
     from signface.progress import progress
-    from signface.render.film import at_rate, beside, pictures_of, read_film, write_film
+    from signface.render.film import beside, pictures_of, read_film, write_film
 
-    weights = {
-        name: at_rate(descriptors, arguments.rate, start_s=arguments.start, end_s=arguments.end)
-        for name, descriptors in shown.items()
-    }
-    streams = [pictures_of(avatar, values) for values in weights.values()]
-    captions = list(weights) if len(weights) > 1 or arguments.video else []
+    moments = {name: _moments(descriptors, arguments.rate, arguments) for name, descriptors in shown.items()}
+    streams = [pictures_of(avatar, *values) for values in moments.values()]
+    captions = list(moments) if len(moments) > 1 or arguments.video else []
     if arguments.video:
         begin = 0.0 if arguments.start is None else arguments.start
         streams.append(read_film(arguments.video, rate=arguments.rate, size=arguments.size, start_s=begin))
         captions.append("video")
     output = _output(source, suffix, ".mp4", arguments)
     pictures = (beside(list(parts), captions) for parts in zip(*streams))
-    total = len(next(iter(weights.values())))
+    total = len(next(iter(moments.values()))[0])
     count = write_film(output, progress(pictures, output.name, total=total), arguments.rate)
     print(f"{output}: {count} pictures, {count / arguments.rate:.1f} s")
 
 
+def _moments(
+    descriptors: Descriptors, rate: float, arguments: argparse.Namespace
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Weights and, unless the head shall stay still or its pose is unknown, rotations of the head, for each picture."""
+    from signface.render.film import at_rate, head_at_rate
+
+    times = {"start_s": arguments.start, "end_s": arguments.end}
+    head = None if arguments.head is False else head_at_rate(descriptors, rate, **times)
+    if arguments.head and head is None:
+        raise SignfaceError(f"{descriptors.name}: how the head moves is unknown", hint="leave --head out")
+    return at_rate(descriptors, rate, **times), head
+
+
 def _write_sheet(source: Path, shown: dict[str, Descriptors], avatar: Avatar, arguments: argparse.Namespace) -> None:
-    from signface.render.film import at_rate, pictures_of, read_film
+    from signface.render.film import pictures_of, read_film
     from signface.render.sheet import make_sheet, write_picture
 
     rows: dict[str, list[np.ndarray]] = {}
     for name, descriptors in shown.items():
-        weights = at_rate(descriptors, 1 / arguments.every, start_s=arguments.start, end_s=arguments.end)
-        rows[name] = list(pictures_of(avatar, weights))
+        rows[name] = list(pictures_of(avatar, *_moments(descriptors, 1 / arguments.every, arguments)))
     count = len(next(iter(rows.values())))
     start = next(iter(shown.values())).start if arguments.start is None else arguments.start
     if arguments.video:

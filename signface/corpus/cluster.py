@@ -19,6 +19,7 @@ from functools import lru_cache
 from typing import TypeVar
 
 from signface.errors import SignfaceError
+from signface.extras import needed
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -118,15 +119,12 @@ def on_cluster(
     SignfaceError
         Dask is not installed, no scheduler answers, or the cluster has no worker.
     """
-    try:
-        from concurrent.futures import CancelledError
+    needed("distributed", "cluster")
+    from concurrent.futures import CancelledError
 
-        from distributed import Client, as_completed
-        from distributed.scheduler import KilledWorker
-    except ModuleNotFoundError as error:
-        raise SignfaceError(
-            f"the package {error.name} is not installed", hint="pip install 'signface[cluster]'"
-        ) from error
+    from distributed import Client, as_completed
+    from distributed.scheduler import KilledWorker
+
     try:
         client = Client(scheduler, timeout=PATIENCE_S, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:

@@ -1,7 +1,7 @@
 """Films of a face: weights in time become pictures, and pictures an MP4 that every browser plays.
 
 - `Avatar`: a face before a fixed camera; `picture` draws one moment.
-- `at_rate`: weights at the rate of a film.
+- `at_rate`, `head_at_rate`: weights, and how the head is turned, at the rate of a film.
 - `pictures_of`: every picture of a film, drawn by several threads, in order.
 - `write_film`: H.264, 4:2:0, the index first, so that a browser begins at once.
 - `read_film`: pictures of a real video at a film's rate and size.
@@ -17,18 +17,19 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
 from os import PathLike
 from pathlib import Path
-from types import ModuleType
 from typing import TypeVar
 
 import numpy as np
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
+from signface.extras import needed
 from signface.face.camera import Camera
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.face.reading import read_parts
 from signface.files import whole_file
+from signface.render.head import Neck, moving_part, rotations_at
 from signface.render.raster import Scene, Style
 from signface.render.still import whole_mesh
 
@@ -57,6 +58,10 @@ class Avatar:
     ------
     SignfaceError
         The size is odd or out of range, or the extra `render` is not installed.
+
+    See Also
+    --------
+    pictures_of : many pictures, by several threads.
 
     Examples
     --------
@@ -90,20 +95,25 @@ class Avatar:
         self._neutral = mesh.vertices
         self._bases = bases.reshape(face.n_bases, -1).astype(np.float32)  # for pictures, half the memory to go through
         self._skin = skin
+        self._neck = Neck(face, mesh.vertices)
         camera = film_camera(face, size, yaw, pitch)
         # From front to back, so that what is hidden is seldom drawn first.
         depth = camera.project(mesh.vertices)[:, 2]
         order = np.argsort(-depth[mesh.triangles].max(axis=1), kind="stable")
         self._scene = Scene(mesh.triangles[order], colours, camera, style)
 
-    def picture(self, weights: np.ndarray) -> np.ndarray:
-        """(height, width, 3) uint8: the face with (N,) weights."""
-        return self.draw(self.pose(weights))
+    def picture(self, weights: np.ndarray, head: np.ndarray | None = None) -> np.ndarray:
+        """(height, width, 3) uint8: the face with (N,) weights; `head` as in `pose`."""
+        return self.draw(self.pose(weights, head))
 
-    def pose(self, weights: np.ndarray) -> np.ndarray:
-        """(..., V, 3) vertices of everything that is drawn, for (..., N) weights; cheaper for many at a time."""
+    def pose(self, weights: np.ndarray, head: np.ndarray | None = None) -> np.ndarray:
+        """(..., V, 3) vertices of everything that is drawn, for (..., N) weights; cheaper for many at a time.
+
+        `head` are (..., 3, 3) rotations of the head; None keeps it still.
+        """
         moved = np.asarray(weights, dtype=np.float32) @ self._bases
-        return self._neutral + moved.reshape(*np.shape(weights)[:-1], -1, 3)
+        vertices = self._neutral + moved.reshape(*np.shape(weights)[:-1], -1, 3)
+        return vertices if head is None else self._neck.turn(vertices, head)
 
     def draw(self, vertices: np.ndarray) -> np.ndarray:
         """(height, width, 3) uint8: a picture of posed vertices."""
@@ -114,8 +124,7 @@ class Avatar:
 def film_camera(face: FaceModel, size: tuple[int, int], yaw: float = 0.0, pitch: float = 0.0) -> Camera:
     """A camera that shows the head from the crown to a little below what moves; a neck's cut end stays outside."""
     vertices = face.mesh.vertices
-    moves = np.linalg.norm(face.bases, axis=2).max(axis=0) > 3.0
-    moving = vertices[moves] if moves.any() else vertices
+    moving = moving_part(face)
     height = float(np.ptp(moving[:, 1]))
     low = max(float(vertices[:, 1].min()) - 0.04 * height, float(moving[:, 1].min()) - 0.09 * height)
     high = float(vertices[:, 1].max()) + 0.06 * height
@@ -151,6 +160,39 @@ def at_rate(
     SignfaceError
         The rate is not positive, the times lie outside the take, or no frame could be solved.
     """
+    times = _film_times(descriptors, rate, start_s, end_s)
+    solved = np.isfinite(descriptors.weights).all(axis=1)
+    if not solved.any():
+        raise SignfaceError(f"{descriptors.name}: no frame could be solved")
+    columns = [np.interp(times, descriptors.time[solved], column[solved]) for column in descriptors.weights.T]
+    return np.stack(columns, axis=1)
+
+
+def head_at_rate(
+    descriptors: Descriptors, rate: float, *, start_s: float | None = None, end_s: float | None = None
+) -> np.ndarray | None:
+    """(K, 3, 3) rotations of the head at the times of `at_rate`; None when its pose is unknown.
+
+    Raises
+    ------
+    SignfaceError
+        The rate is not positive, or the times lie outside the take.
+
+    See Also
+    --------
+    signface.render.head.rotations_at : between frames, and where a pose is unknown.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> weights = sf.solve(sf.datasets.mini_take())
+    >>> head_at_rate(weights, 25, start_s=1.0, end_s=2.0).shape
+    (26, 3, 3)
+    """
+    return rotations_at(descriptors, _film_times(descriptors, rate, start_s, end_s))
+
+
+def _film_times(descriptors: Descriptors, rate: float, start_s: float | None, end_s: float | None) -> np.ndarray:
     if not (np.isfinite(rate) and 0 < rate <= 240):
         raise SignfaceError(f"a film of {rate:g} pictures a second cannot be made", hint="choose 1 to 240")
     time = descriptors.time
@@ -161,12 +203,7 @@ def at_rate(
             f"{descriptors.name}: {start:g} to {end:g} s is not inside the take",
             hint=f"it goes from {time[0]:.3f} to {time[-1]:.3f} s",
         )
-    solved = np.isfinite(descriptors.weights).all(axis=1)
-    if not solved.any():
-        raise SignfaceError(f"{descriptors.name}: no frame could be solved")
-    times = start + np.arange(max(1, int((end - start) * rate + 1e-6) + 1)) / rate
-    columns = [np.interp(times, time[solved], column[solved]) for column in descriptors.weights.T]
-    return np.stack(columns, axis=1)
+    return start + np.arange(max(1, int((end - start) * rate + 1e-6) + 1)) / rate
 
 
 def in_order(work: Callable[[Item], Made], items: Iterable[Item], workers: int | None = None) -> Iterator[Made]:
@@ -180,9 +217,12 @@ def in_order(work: Callable[[Item], Made], items: Iterable[Item], workers: int |
             running.extend(pool.submit(work, item) for item in islice(waiting, 1))
 
 
-def pictures_of(avatar: Avatar, weights: np.ndarray) -> Iterator[np.ndarray]:
-    """Every picture of (K, N) weights, in order."""
-    posed = (vertices for start in range(0, len(weights), 16) for vertices in avatar.pose(weights[start : start + 16]))
+def pictures_of(avatar: Avatar, weights: np.ndarray, head: np.ndarray | None = None) -> Iterator[np.ndarray]:
+    """Every picture of (K, N) weights, in order; the head turned by (K, 3, 3) rotations, or still."""
+    parts = (slice(start, start + 16) for start in range(0, len(weights), 16))
+    posed = (
+        vertices for part in parts for vertices in avatar.pose(weights[part], None if head is None else head[part])
+    )
     return in_order(avatar.draw, posed)
 
 
@@ -204,16 +244,6 @@ def beside(pictures: list[np.ndarray], captions: list[str] | None = None) -> np.
     return np.asarray(image)
 
 
-def _ffmpeg() -> ModuleType:
-    try:
-        import imageio_ffmpeg
-    except ModuleNotFoundError as error:
-        raise SignfaceError(
-            "the package imageio-ffmpeg is not installed", hint="pip install 'signface[render]'"
-        ) from error
-    return imageio_ffmpeg
-
-
 def write_film(path: str | PathLike[str], pictures: Iterable[np.ndarray], rate: float) -> int:
     """Write pictures as MP4 (H.264, yuv420p, index first); the number of pictures.
 
@@ -224,7 +254,7 @@ def write_film(path: str | PathLike[str], pictures: Iterable[np.ndarray], rate: 
     """
     if Path(path).suffix.lower() != ".mp4":
         raise SignfaceError("the ending of a film is .mp4", file=path)
-    ffmpeg = _ffmpeg()
+    ffmpeg = needed("imageio_ffmpeg", "render")
     count, writer = 0, None
     with whole_file(path) as temporary:
         try:
@@ -271,7 +301,7 @@ def read_film(
     """
     if not Path(path).is_file():
         raise SignfaceError("no such file", file=path)
-    ffmpeg = _ffmpeg()
+    ffmpeg = needed("imageio_ffmpeg", "render")
     width, height = size
     fit = f"scale={width}:{height}:force_original_aspect_ratio=decrease,pad={width}:{height}:-1:-1:color=0x8c9096"
     reader = ffmpeg.read_frames(

@@ -15,7 +15,7 @@ import pytest
 from lxml import etree
 
 from signface.cli.main import main
-from signface.corpus.cluster import WorkerDied, on_cores
+from signface.corpus.cluster import WorkerDied, on_cluster, on_cores
 from signface.corpus.jobs import BEFORE, CORRECTED, DONE, FAILED
 from signface.corpus.manifest import Corpus, TakeEntry, read_corpus, write_takes
 from signface.corpus.running import run_corpus
@@ -216,6 +216,12 @@ def test_what_cannot_begin_is_one_clear_error_and_writes_nothing(feel, ready):
         list(run_corpus(Corpus(feel, (*takes, twin)), classifier=mine))
     assert not (feel / "annotated").exists()
     assert not (feel / "descriptors").exists()
+
+
+def test_without_dask_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(SignfaceError, match=r"distributed is not installed.*signface\[cluster\]"):
+        next(on_cluster(abs, [1], scheduler="tcp://127.0.0.1:9"))
 
 
 def test_without_a_scheduler_at_the_address_there_is_one_clear_error(feel, ready, monkeypatch):

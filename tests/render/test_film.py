@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import sys
 
 import numpy as np
 import pytest
@@ -192,6 +193,17 @@ def test_a_file_that_is_no_video_is_one_line(tmp_path):
         next(read_film(tmp_path / "video.mp4", rate=25, size=SIZE))
     with pytest.raises(SignfaceError, match="no such file"):
         next(read_film(tmp_path / "none.mp4", rate=25, size=SIZE))
+
+
+def test_without_ffmpeg_the_extra_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    (tmp_path / "video.mp4").touch()
+    for use in (
+        lambda: write_film(tmp_path / "film.mp4", [], 25),
+        lambda: next(read_film(tmp_path / "video.mp4", rate=25, size=SIZE)),
+    ):
+        with pytest.raises(SignfaceError, match=r"imageio_ffmpeg is not installed.*signface\[render\]"):
+            use()
 
 
 def test_a_film_of_nothing_leaves_no_file(tmp_path):

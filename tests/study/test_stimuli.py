@@ -6,6 +6,7 @@ import csv
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from signface.cli.main import main
 from signface.descriptors import Descriptors
@@ -65,6 +66,7 @@ def test_one_command_makes_every_film_of_a_study(study_folder, capsys):
         (RENDER, "", "says nothing of films"),
         ("[64, 64]", '"64x64"', "render.size"),
         ("rate = 10", "rate = 0", "render.rate"),
+        ("rate = 10", "rate = 10\nhead = 1", "render.head"),
         ("[render.methods.pair]", "[render.methods.paar]", "how to make"),
         ('solver = "least-squares"', "", "needs one of"),
         ("[0.6, 0.6, 0.7]", "7", "colour must"),
@@ -75,6 +77,27 @@ def test_a_mistake_in_how_films_are_made_is_said(study_folder, before, after, sa
     (study_folder / "study.toml").write_text(text.replace(before, after), encoding="utf-8")
     with pytest.raises(SignfaceError, match=said):
         plan_films(read_study(study_folder, films=False))
+
+
+def test_stimuli_keep_the_head_still_unless_the_study_lets_it_move(study_folder, face, capsys):
+    def films() -> dict[str, bytes]:
+        assert main(["study", "render", str(study_folder)]) == 0
+        return {file.name: file.read_bytes() for file in (study_folder / "films").iterdir()}
+
+    still = films()
+    text = (study_folder / "study.toml").read_text(encoding="utf-8")
+    (study_folder / "study.toml").write_text(text.replace("rate = 10", "rate = 10\nhead = true"), encoding="utf-8")
+    assert main(["study", "render", str(study_folder)]) == 2  # the weights files know no head
+    assert "how the head moves is unknown" in capsys.readouterr().err
+    head = np.tile(np.eye(4), (11, 1, 1))
+    head[5:, :3, :3] = Rotation.from_euler("x", 20, degrees=True).as_matrix()
+    for name in ("A3", "J3"):
+        nod = Descriptors(np.zeros((11, face.n_bases)), face.names, 20.0, head=head)
+        write_weights(nod, study_folder / "weights" / f"{name}.csv")
+    moving = films()
+    assert {name for name in still if still[name] != moving[name]} == set(still)
+    assert main(["study", "render", str(study_folder), "--no-head"]) == 2
+    assert "[render]" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

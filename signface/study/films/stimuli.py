@@ -149,13 +149,17 @@ class FilmPlan:
 
 @dataclass(frozen=True)
 class StudyFilms:
-    """Everything that `[render]` of a study says."""
+    """Everything that `[render]` of a study says.
+
+    `head`: whether it moves; stimuli of the thesis keep it still, so that only the face tells expressions apart.
+    """
 
     plans: tuple[FilmPlan, ...]
     rate: float
     size: tuple[int, int]
     face: str
     layout: str | None
+    head: bool = False
 
 
 def plan_films(study: Study, *, takes_made: Callable[[Path, int], None] | None = None) -> StudyFilms:
@@ -183,6 +187,9 @@ def plan_films(study: Study, *, takes_made: Callable[[Path, int], None] | None =
     rate = table.get("rate", 25)
     if not isinstance(rate, (int, float)) or not 1 <= rate <= 120:
         raise SignfaceError("render.rate must be a number from 1 to 120", file=file)
+    head = table.get("head", False)
+    if not isinstance(head, bool):
+        raise SignfaceError("render.head must be true or false", file=file)
     folder = study.folder / str(table.get("takes", "takes"))
     signer = table.get("synthetic_signer", -1)
     if not folder.is_dir() and isinstance(signer, int) and signer >= 0 and takes_made is not None:
@@ -203,7 +210,12 @@ def plan_films(study: Study, *, takes_made: Callable[[Path, int], None] | None =
             output = study.folder / film
             plans[output] = FilmPlan(excerpts[name], method, looks[method], output)
     return StudyFilms(
-        tuple(plans.values()), float(rate), (size[0], size[1]), str(table.get("face", "default")), table.get("layout")
+        tuple(plans.values()),
+        float(rate),
+        (size[0], size[1]),
+        str(table.get("face", "default")),
+        table.get("layout"),
+        head,
     )
 
 
@@ -281,11 +293,11 @@ def render_study(
     Raises
     ------
     SignfaceError
-        A take, a weights file or a video is missing or cannot be used.
+        A take, a weights file or a video is missing or cannot be used, or heads shall move and one's pose is unknown.
     """
     from signface.face.layout_files import choose_layout, read_layout
     from signface.face.reading import read_face
-    from signface.render.film import Avatar, at_rate, pictures_of, read_film, write_film
+    from signface.render.film import Avatar, at_rate, head_at_rate, pictures_of, read_film, write_film
     from signface.takes.reading import read_take
 
     face = read_face(films.face)
@@ -330,9 +342,12 @@ def render_study(
                 descriptors, whole = solved(excerpt.take)[plan.method], True
             _same_bases(descriptors, face)
             times = {"start_s": excerpt.start_s, "end_s": excerpt.end_s} if whole else {}
-            write_film(
-                plan.output, pictures_of(avatar(look.colour), at_rate(descriptors, films.rate, **times)), films.rate
-            )
+            weights = at_rate(descriptors, films.rate, **times)
+            head = head_at_rate(descriptors, films.rate, **times) if films.head else None
+            if films.head and head is None:  # beside films that nod, a still head would be a difference of methods
+                hint = "leave head = true out of [render], or give weights with head poses"
+                raise SignfaceError(f"{descriptors.name}: how the head moves is unknown", hint=hint)
+            write_film(plan.output, pictures_of(avatar(look.colour), weights, head), films.rate)
         count += 1
     return count
 
