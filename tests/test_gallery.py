@@ -46,9 +46,11 @@ def test_a_script_of_the_gallery_is_short_and_uses_the_front_door(script):
     assert sum(1 for line in text.splitlines() if line.strip() and not line.startswith("#")) <= 60
 
 
+@pytest.mark.slow
 def test_the_script_of_the_readme_runs(elsewhere, capsys):
     text = (REPOSITORY / "README.md").read_text(encoding="utf-8")
     shutil.copytree(REPOSITORY / "corpora" / "mini", elsewhere / "corpora" / "mini")
+    names = {"__name__": "script"}
     for script in re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL):
-        exec(compile(script, "README.md", "exec"), {"__name__": "script"})
+        exec(compile(script, "README.md", "exec"), names)
     assert capsys.readouterr().out.strip()

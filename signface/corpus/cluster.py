@@ -63,7 +63,7 @@ def on_cores(
     processes = max(2, workers)  # with one, joblib would work in this process, which must not die
     handed_out = workers if workers == 1 else workers + 1
     while pending:
-        numbered = (delayed(_numbered)(function, number, job) for number, job in list(pending.items()))
+        numbered = (delayed(_numbered)(os.getcwd(), function, number, job) for number, job in list(pending.items()))
         parallel = Parallel(n_jobs=processes, return_as="generator_unordered", batch_size=1, pre_dispatch=handed_out)
         try:
             for number, result in parallel(numbered):
@@ -74,7 +74,8 @@ def on_cores(
                 yield pending.pop(number), _on_its_own(function, jobs[number])
 
 
-def _numbered(function: Callable[[Job], Result], number: int, job: Job) -> tuple[int, Result]:
+def _numbered(here: str, function: Callable[[Job], Result], number: int, job: Job) -> tuple[int, Result]:
+    os.chdir(here)  # the process may have been started in another folder, for an earlier corpus
     _leave_with_parent()
     return number, function(job)
 

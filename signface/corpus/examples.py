@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
@@ -149,9 +150,17 @@ def _described(
 
     stored = [None if store is None else store.read(origin) for origin in origins]
     missing = [(e, o) for e, o, descriptors in zip(entries, origins, stored, strict=True) if descriptors is None]
-    jobs = (delayed(stored_or_solved)(entry, origin, store, folder) for entry, origin in missing)
+    jobs = (delayed(_solved)(os.getcwd(), entry, origin, store, folder) for entry, origin in missing)
     solved = iter(())
     if missing:
         solved = Parallel(n_jobs=min(workers, len(missing)), return_as="generator")(jobs)
     for descriptors in stored:
         yield next(solved)[0] if descriptors is None else descriptors
+
+
+def _solved(
+    here: str, entry: TakeEntry, origin: Origin, store: DescriptorStore | None, folder: Path
+) -> tuple[Descriptors, bool]:
+    """`stored_or_solved` in a process that may have been started in another folder than this one, `here`."""
+    os.chdir(here)
+    return stored_or_solved(entry, origin, store, folder)

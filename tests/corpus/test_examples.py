@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import shutil
+
 import numpy as np
 import pytest
 
 from signface.corpus.examples import solve_corpus
-from signface.corpus.manifest import Corpus, TakeEntry
+from signface.corpus.manifest import Corpus, TakeEntry, read_corpus
 from signface.descriptors_files import write_weights
 from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
+from signface.files import bundled_corpus
 from tests.fixtures.hand_made import example
 
 
@@ -52,3 +55,11 @@ def test_what_is_wrong_in_one_of_several_takes_is_said(entry, tmp_path):
     broken.write_bytes(b"nonsense")
     with pytest.raises(SignfaceError, match=r"broken\.c3d"):
         solve_corpus(Corpus(tmp_path, (row, TakeEntry(broken, "S1", "EU", annotation=row.annotation))))
+
+
+def test_a_corpus_named_from_another_folder_than_the_one_before_is_solved(tmp_path, monkeypatch):
+    for name in ("one", "two"):
+        shutil.copytree(bundled_corpus(), tmp_path / name / f"mini-{name}")
+        monkeypatch.chdir(tmp_path / name)
+        takes = solve_corpus(read_corpus(f"mini-{name}").select(kinds=["EU"]))
+        assert [example.take for example in takes] == ["M1_EU_11", "M2_EU_04"]

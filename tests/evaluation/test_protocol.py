@@ -64,6 +64,7 @@ def test_training_is_given_the_training_takes_and_nothing_else(examples, monkeyp
     assert not {e.take for e in trained_on} & {e.take for e in examples if e.kind == "EU"}
 
 
+@pytest.mark.slow
 def test_answers_do_not_depend_on_the_references_of_the_test_takes(examples):
     """Were a test reference seen in training, turning all of them round would change what is found."""
     other = dict(zip(AFFECT.values, [*list(AFFECT.values)[1:], "N"], strict=True))

@@ -66,6 +66,7 @@ for name in ("knn3", "svm-linear", "svm-rbf", "forest"):
 """
 
 
+@pytest.mark.slow
 def test_two_trainings_with_one_seed_write_the_same_bytes(tmp_path):
     for folder in ("one", "other"):
         (tmp_path / folder).mkdir()

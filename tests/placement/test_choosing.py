@@ -32,6 +32,7 @@ def test_every_method_gives_the_number_asked_for_symmetric_and_apart(face, mater
     assert len(layout.head_labels) == 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_fixed_markers_stay(face, material, actors, method):
     nose = int(np.argmax(face.mesh.vertices[:, 2]))

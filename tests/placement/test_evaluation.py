@@ -163,6 +163,7 @@ def test_the_sheet_numbers_every_marker_once_and_measures_as_a_calliper(face):
     assert abs(np.linalg.norm(here - there) - first["nearest_mm"]) <= 0.5
 
 
+@pytest.mark.slow
 def test_one_command_makes_the_report_and_a_second_run_resumes(tmp_path, capsys, face):
     command = ["layout", "study", "-o", str(tmp_path), "--seconds", "6", "--actors", "3", "--sizes", "15"]
     command += ["--methods", "a-optimal", "--layouts", "man-15,default-40", "--draws", "1", "--recommended", "15"]

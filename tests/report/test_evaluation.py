@@ -98,6 +98,7 @@ class Elements(HTMLParser):
             self.wrong.append(tag)
 
 
+@pytest.mark.slow
 def test_every_section_is_there_and_is_reached_from_the_contents(page):
     elements = Elements(page)
     assert elements.wrong == elements.open == []
@@ -163,6 +164,7 @@ def test_pictures_have_descriptions_and_are_files_too(page, folder):
             assert len(content) > 2000
 
 
+@pytest.mark.slow
 def test_the_same_evaluation_gives_the_same_bytes(both, folder, tmp_path):
     again = evaluated(both.examples, date="22 November 2026")
     write_files(again, tmp_path)
@@ -181,6 +183,7 @@ def test_the_headline_has_the_accuracies_and_what_they_are_held_against(both):
     assert "synthetic" not in " ".join([*headline(both.metrics, real, both.vocabulary), *limits(both.metrics, real)])
 
 
+@pytest.mark.slow
 def test_one_signer_and_a_take_in_which_nothing_is_found(tmp_path):
     one = evaluated(some(("S1",)), protocols=("within",), classifiers=("knn1",))
     found = one.found["within"]["knn1"]

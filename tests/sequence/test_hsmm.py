@@ -35,6 +35,7 @@ def model(request, takes):
     return train([e for e in takes if e.signer == "S1"], quick(request.param, parameters=fewer.get(request.param, {})))
 
 
+@pytest.mark.slow
 def test_boundaries_and_labels_of_another_signer_are_found(model, takes):
     unseen = [e for e in takes if e.signer == "S2"]
     scores = []

@@ -94,6 +94,7 @@ def test_files_are_read_in_the_same_pieces_as_takes(gappy, tmp_path):
         np.testing.assert_array_equal(recording.frames(7, 1195, 100), whole.positions[7:1195:100])
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_recording(gappy, face, layout, tmp_path, monkeypatch):
     monkeypatch.setattr(preparation, "VIEW_FRAMES", 500)
     monkeypatch.setattr(gaps, "SAMPLE_FRAMES", 100)

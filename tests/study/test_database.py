@@ -82,6 +82,7 @@ def test_a_server_that_is_killed_loses_no_acknowledged_answer(tmp_path):
     store.close()
 
 
+@pytest.mark.slow
 def test_a_crowd_loses_no_answer(tmp_path):
     write_study(tmp_path)
     with served(tmp_path) as (address, _):
@@ -92,6 +93,7 @@ def test_a_crowd_loses_no_answer(tmp_path):
     assert check_nothing_is_lost(load, tmp_path / "answers.sqlite") == (0, 0)
 
 
+@pytest.mark.slow
 def test_a_crowd_loses_no_answer_in_postgresql(tmp_path, database):
     write_study(tmp_path)
     with served(tmp_path, "--database", database) as (address, _):
