@@ -15,13 +15,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from signface.content import Content
 from signface.errors import SignfaceError
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 REQUIRED = ("participant", "stimulus", "expression", "method")
 
@@ -164,8 +162,6 @@ def read_responses(path: str | PathLike[str]) -> Responses:
         participant, stimulus, expression or method; a participant answered one stimulus twice and differently, or
         has two ages, genders, habits or visions. All of it is said at once.
     """
-    import pandas as pd
-
     try:
         raw = pd.read_csv(path, dtype=str, keep_default_na=False, sep=None, engine="python", encoding="utf-8-sig")
     except FileNotFoundError as error:
@@ -195,8 +191,6 @@ def combine(studies: Sequence[Responses]) -> Responses:
     Responses
         Simulated if any part is; each warning names its study. One study comes back as it is.
     """
-    import pandas as pd
-
     if len(studies) == 1:
         return studies[0]
     names = [Path(study.name).name for study in studies]
@@ -220,7 +214,6 @@ def validate(raw: pd.DataFrame, *, name: str = "responses") -> Responses:
     name : str
         Opens the messages.
     """
-
     table = raw.copy()
     table.columns = [str(column).strip() for column in table.columns]
     table = table.reset_index(drop=True)
@@ -303,8 +296,6 @@ def _text(value: object) -> str:
 
 def _numbers(problems: list[str], words: pd.Series, column: str, valid: Callable[[pd.Series], pd.Series]) -> pd.Series:
     """The words of a column as numbers, NaN where empty; what is no number or out of range is a problem."""
-    import pandas as pd
-
     values = pd.to_numeric(words.where(words != ""), errors="coerce").astype(float)
     wrong = (words != "") & ~(values.notna() & valid(values))
     _refuse(problems, wrong, f"{column} out of range", words)

@@ -71,7 +71,6 @@ def evaluation_page(evaluated: Evaluated, drawn: Mapping[str, Sequence[Drawn]]) 
         ),
         provenance=_provenance(evaluated),
         recordings=_recordings(facts),
-        reading=words.READING,
         versions=facts["versions"],
         seed=metrics["protocol"]["seed"],
     )

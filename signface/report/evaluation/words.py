@@ -3,7 +3,6 @@
 - `headline`: the main result in two or three sentences.
 - `limits`: what the numbers do not show.
 - `protocol_words`, `training_words`: what was trained on and tested, and how, in plain words.
-- `READING`: how the measures are read.
 """
 
 from __future__ import annotations
@@ -17,68 +16,6 @@ from signface.report.evaluation.tables import by_protocol
 from signface.settings.choices import NAMES, SEQUENCE_NAMES
 
 KIND_WORDS = {"IE": "isolated expressions", "SE": "sequences of expressions", "EU": "expressive utterances"}
-
-#: Term and what it means, for readers who have not read the documents.
-READING = (
-    (
-        "Reference and manual segments",
-        "What an annotator marked: stretches in which an expression is held, and the transitions between them. On "
-        "manual segments only the label is judged: the classifier is told where the segment lies.",
-    ),
-    (
-        "Automatic segments",
-        "Those that the program finds itself. Each should have the label that the reference gives to most of it. Those "
-        "that lie wholly in a transition of the reference have no right label and are left out of the accuracy (the "
-        "tables count them).",
-    ),
-    (
-        "Frames",
-        "The whole annotation as one finds it on opening the file, looked at 25 times a second; all transitions count "
-        "as one further label.",
-    ),
-    (
-        "Accuracy, balanced accuracy, macro F1",
-        "Share of labels that are right; the same averaged over the labels, so that a frequent one weighs no more than "
-        "a rare one; and the mean over the labels of the F1, which also minds what was wrongly called by a label.",
-    ),
-    (
-        "Chance and majority",
-        "What a guess among the labels gets, and what one gets by always saying the test takes’ most frequent label. "
-        "The second knows the answers’ shares and is the harder to beat.",
-    ),
-    (
-        "Intervals",
-        "95 % of what comes out when whole takes are drawn again with replacement. They tell how much hangs on these "
-        "takes. They do not tell how other signers would do.",
-    ),
-    (
-        "Boundary F1",
-        "Boundaries found within 0.05, 0.10 or 0.20 s of a boundary of the reference, each used once: 2 × matched / "
-        "(boundaries of the one + boundaries of the other).",
-    ),
-    (
-        "Mean IoU, frame agreement, edit score",
-        "Overlap of each segment with its best counterpart (intersection over union); share of the time on which both "
-        "say “stable” or both say “transition”; and whether the same things happen in the same order, whenever "
-        "(1 is the same order). The edit score compares labels where there are labels, so that the plain energies, "
-        "which have none, are not comparable in it with the others.",
-    ),
-    (
-        "Over- and under-segmentation",
-        "Share of the reference’s stable segments that are cut in two or more, and share of the stable segments found "
-        "in which two or more of the reference’s lie.",
-    ),
-    (
-        "McNemar’s test",
-        "Counts the segments that only one of two classifiers labels rightly. p is the chance of a difference this "
-        "large if they were equally good. Segments of one take are alike, which makes p smaller than it should be.",
-    ),
-    (
-        "Permutation importance",
-        "Accuracy that is lost when the weights of one base are dealt out anew among the segments of the same signer. "
-        "A base that another can stand in for looks less useful than it is.",
-    ),
-)
 
 
 def percent(value: float | None) -> str:

@@ -16,7 +16,7 @@ import pandas as pd
 from signface.face.layout_files import write_layout
 from signface.files import whole_file
 from signface.placement.choosing import METHODS, Material, unseen_words
-from signface.placement.comparison import Comparison, ComparisonPlan, summarise
+from signface.placement.comparison import Comparison, summarise
 from signface.placement.empirical import EMPIRICAL
 from signface.placement.evaluation import MAPPINGS, error_map
 from signface.placement.findings import against, flattening, mean_moment, same_size
@@ -103,9 +103,9 @@ def comparison_page(comparison: Comparison) -> str:
             *_painted(comparison),
         ],
         tables=[page_table(frame, key, caption, decimals=3, folded=True) for key, caption, frame in shown],
-        method=_method(plan),
+        plan=plan,
+        empirical=EMPIRICAL,
         version=version_of("signface"),
-        seed=plan.seed,
     )
 
 
@@ -181,22 +181,3 @@ def _findings(table: pd.DataFrame, recommended: str, method: str) -> list[str]:
             f"{row.pairs} pairs of actors and draws."
         )
     return words
-
-
-def _method(plan: ComparisonPlan) -> list[str]:
-    return [
-        f"{plan.actors} synthetic actors, each with a head and skin of their own, a range of motion and signed takes "
-        f"of {plan.seconds:g} s at 30 frames a second. Markers are chosen on the range of motion of the first "
-        f"{plan.selection}; errors are taken on the takes of the others, which no choice has seen. The learnt mappings "
-        "are trained on one actor's range of motion and tested on another actor's takes.",
-        "Error: root mean square distance of a vertex that moves from its place on the avatar, in millimetres; eq. 3.5 "
-        "of the thesis sums over the vertices instead, which multiplies it by the square root of their number (column "
-        "rmse_mm of errors.csv).",
-        "Glued: every actor wears every marker 1 to 3 mm beside its place, with 0.1 to 0.3 mm of jitter, in training "
-        f"and in tests; {plan.draws} draws.",
-        "The method of the recommended layout is the one with the least error on the selection actors, each left out "
-        "in turn (choice_of_method.csv).",
-        "Empirical layouts: " + "; ".join(f"{name}: {what}" for name, what in EMPIRICAL.items()) + ".",
-        "These are synthetic faces with the avatar's 51 bases beneath: what a base does not show (a wrinkle) no layout "
-        "is rewarded for seeing.",
-    ]

@@ -42,24 +42,6 @@ SHORT = {
     "participants": "Participants",
 }
 
-READING = (
-    "The tests and the tables are those of a published study of facial animation: non-parametric tests on forced "
-    "choices and on scales from 1 to 7. A p-value says how surprising the answers would be if the null hypothesis were "
-    "true; it does not say how large a difference is. The effect sizes do: Cramér's V for counts, ε² for "
-    "Kruskal-Wallis and Scheirer-Ray-Hare, the rank-biserial correlation r for pairs, ρ for correlations, with the "
-    "usual words for their size.",
-    "Conditions: Spearman wants a monotone relation, χ² an expected count of 5 in each cell, Kruskal-Wallis 5 answers "
-    "in each group, Scheirer-Ray-Hare 5 in each cell, Wilcoxon 20 pairs that differ. Where one is not met, the table "
-    "says so.",
-    "All these tests take answers, or pairs of answers, as independent of each other. They are not: a participant "
-    "gives many. For age, gender, vision or habit, which belong to the participant, they find differences that "
-    "are not there; for methods, they do so when participants react to a method each in their own way, and hide "
-    "differences when they do not. The part with participants as random effects, the column “p over participants” "
-    "and the intervals over participants do not make that assumption; where the two disagree, trust them.",
-    "Where several hypotheses are tested at once, p (Holm) keeps the chance of any false alarm among them below the "
-    "level.",
-)
-
 
 def write_report(
     analysis: Analysis,
@@ -161,7 +143,6 @@ def report_html(
         findings=analysis.findings,
         sections=[_section(section, drawn.get(section.key, []), analysis) for section in analysis.sections],
         screenshots=_pictures(screenshots),
-        reading=READING,
         alpha=f"{analysis.alpha:g}",
         resamples=analysis.resamples,
         seed=analysis.seed,

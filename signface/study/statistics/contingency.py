@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import stats
 
 from signface.metrics import classification
 from signface.study.statistics.effect_sizes import cramers_v
@@ -34,8 +35,6 @@ def chi_square(counts: ArrayLike) -> TestResult:
     >>> round(chi_square([[304, 182], [303, 183], [293, 193]]).statistic, 3)
     0.645
     """
-    from scipy import stats
-
     table = np.asarray(counts, float)
     table = table[table.sum(axis=1) > 0][:, table.sum(axis=0) > 0]
     name, n = "χ²", int(table.sum())
@@ -87,8 +86,6 @@ def cochran(blocks: ArrayLike) -> TestResult:
         Right (1) or wrong (0); rows with a NaN, or where all methods agree, tell nothing and are left out. The
         condition is 24 informative answers, that is rows that do not agree times methods (Tate and Brown 1970).
     """
-    from scipy import stats
-
     table = np.asarray(blocks, float)
     table = table[~np.isnan(table).any(axis=1)]
     k = table.shape[1] if table.ndim == 2 else 0

@@ -9,14 +9,11 @@ Participants are drawn with replacement, each with all their answers (`signface.
 from __future__ import annotations
 
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from signface.metrics.bootstrap import cluster_draws, mean_interval
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def participant_interval(

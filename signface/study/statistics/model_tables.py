@@ -12,9 +12,10 @@ import math
 import warnings
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
+from scipy import stats
 
 from signface.extras import needed
 from signface.study.responses import Responses
@@ -25,9 +26,6 @@ from signface.study.statistics.rank_tests import dunn, friedman, wilcoxon
 from signface.study.statistics.tables import StudyTable
 from signface.study.statistics.test_result import TestResult, holm
 from signface.study.statistics.thesis_tables import RESULT_KINDS, paired, participant_means, result_cells
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 #: Fewer levels than this give no idea of a variance.
 LEAST_LEVELS = 5
@@ -112,7 +110,6 @@ def _none(why: str) -> TestResult:
 def _mixed(
     table: pd.DataFrame, column: str, methods: list[str]
 ) -> tuple[OrdinalFit | None, TestResult, dict[str, float]]:
-    from scipy import stats
 
     people = table["participant"].nunique()
     if len(methods) < 2 or people < LEAST_LEVELS or table[column].nunique() < 2:
@@ -148,9 +145,6 @@ def _averaged(table: pd.DataFrame, column: str, methods: list[str]) -> TestResul
     participants less one as denominator. It describes the population's answers, where the mixed model describes a
     person's; it wants no distribution of the random effects, and many participants.
     """
-    import pandas as pd
-    from scipy import stats
-
     people = table["participant"].nunique()
     if len(methods) < 2 or table[column].nunique() < 2:
         return _none("one method" if len(methods) < 2 else "constant answers")
@@ -192,8 +186,6 @@ def _averaged(table: pd.DataFrame, column: str, methods: list[str]) -> TestResul
 
 def models_table(responses: Responses, comparisons: dict[str, MethodComparison]) -> StudyTable:
     """The three comparisons of every question, with the spread of the random effects."""
-    import pandas as pd
-
     mixed = holm([comparison.likelihood_ratio.p for comparison in comparisons.values()])
     rows: list[dict[tuple[str, str], object]] = []
     notes: list[str] = []
@@ -259,9 +251,6 @@ def contrasts_table(
     responses: Responses, comparisons: dict[str, MethodComparison], *, resamples: int, seed: int
 ) -> StudyTable:
     """Every pair of methods: difference of means with its interval, odds ratio, p with Holm's correction."""
-    import pandas as pd
-    from scipy import stats
-
     rows = []
     for column, comparison in comparisons.items():
         intervals = difference_intervals(responses.table, column, comparison.methods, resamples=resamples, seed=seed)
@@ -317,8 +306,6 @@ def contrasts_table(
 
 def posthoc_table(responses: Responses) -> StudyTable:
     """Dunn's comparisons after Kruskal-Wallis, McNemar's after Cochran's Q, with Holm's correction in a question."""
-    import pandas as pd
-
     methods, rows = responses.methods, []
     for column, name in responses.questions.items():
         groups = [responses.table.loc[responses.table["method"] == method, column].dropna() for method in methods]

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from signface.study.responses import FACTORS, PERSONAL, Responses
 from signface.study.statistics.contingency import chi_square
@@ -18,9 +19,6 @@ from signface.study.statistics.rank_tests import kruskal_wallis, spearman
 from signface.study.statistics.tables import StudyTable, write_cell, write_p
 from signface.study.statistics.test_result import TestResult, holm
 from signface.study.statistics.thesis_tables import RESULT_KINDS, result_cells, right_and_wrong
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 #: Factors with an order, on which Spearman's correlation is used; the others make groups.
 ORDERED = ("age", "avatar_habit", "intensity")
@@ -78,8 +76,6 @@ def influence_results(responses: Responses) -> list[Influence]:
 
 def influence_table(responses: Responses, results: list[Influence]) -> StudyTable:
     """Statistic and p of every question and factor (form of tables A.2 and A.5)."""
-    import pandas as pd
-
     rows: list[dict[tuple[str, str], object]] = []
     kinds: dict[str | tuple[str, str], str] = {}
     for question, name in responses.questions.items():
@@ -113,8 +109,6 @@ def influence_table(responses: Responses, results: list[Influence]) -> StudyTabl
 
 def influence_details(responses: Responses, results: list[Influence]) -> StudyTable:
     """One row per test of `influence_table`, with effect sizes, corrections, conditions, and p over participants."""
-    import pandas as pd
-
     corrected = holm([influence.result.p for influence in results])
     rows = [
         {"question": responses.questions[influence.question], "factor": FACTORS[influence.factor]}
@@ -134,8 +128,6 @@ def influence_details(responses: Responses, results: list[Influence]) -> StudyTa
 
 def remarks_table(responses: Responses, results: list[Influence], *, alpha: float = 0.05) -> StudyTable:
     """What is significant, in words, and the reasons to doubt it (form of tables A.1 and A.7)."""
-    import pandas as pd
-
     corrected = holm([influence.result.p for influence in results])
     rows = []
     for influence, p in zip(results, corrected):
@@ -185,8 +177,6 @@ def _doubts(responses: Responses, influence: Influence, corrected: float, alpha:
 
 def habit_table(responses: Responses) -> StudyTable | None:
     """Means of every question by habit of avatars, with the number of participants (form of A.1 (A) and A.8 (A))."""
-    import pandas as pd
-
     if responses.people()["avatar_habit"].notna().sum() == 0:
         return None
     sizes = responses.people()["avatar_habit"].value_counts()
@@ -211,8 +201,6 @@ def group_table(responses: Responses, factor: str) -> StudyTable | None:
     factor : str
         `vision_problem` or `gender`. None is returned where it does not vary.
     """
-    import pandas as pd
-
     people = responses.people()[factor].dropna()
     if people.nunique() < 2:
         return None

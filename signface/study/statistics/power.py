@@ -12,6 +12,8 @@ from __future__ import annotations
 import math
 from itertools import combinations
 
+import pandas as pd
+
 from signface.extras import needed
 from signface.study.responses import Responses
 from signface.study.statistics.tables import StudyTable
@@ -71,8 +73,6 @@ def participants_needed(difference: float, spread: float, *, alpha: float = 0.05
 
 def power_table(responses: Responses, *, alpha: float = 0.05) -> StudyTable:
     """What could have been found, and the participants needed for a small and a middling difference."""
-    import pandas as pd
-
     rows = []
     for column, name in responses.questions.items():
         means = participant_means(responses, column)

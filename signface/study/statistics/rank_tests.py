@@ -17,7 +17,9 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
+from scipy import stats
 
 from signface.study.statistics.effect_sizes import epsilon_squared, rank_biserial
 from signface.study.statistics.test_result import TestResult, untestable
@@ -52,8 +54,6 @@ def spearman(factor: ArrayLike, answers: ArrayLike, *, persons: ArrayLike | None
     >>> spearman([1, 2, 3, 4], [2, 4, 5, 9]).statistic
     1.0
     """
-    from scipy import stats
-
     x, y = np.asarray(factor, float), np.asarray(answers, float)
     kept = ~(np.isnan(x) | np.isnan(y))
     x, y = x[kept], y[kept]
@@ -112,8 +112,6 @@ def kruskal_wallis(groups: Sequence[ArrayLike]) -> TestResult:
     groups : sequence of array_like
         The answers of each level of the factor. The condition is at least 5 answers in each.
     """
-    from scipy import stats
-
     name = "Kruskal-Wallis"
     arrays = [values[~np.isnan(values)] for values in (np.asarray(group, float) for group in groups)]
     arrays = [values for values in arrays if len(values)]
@@ -158,9 +156,6 @@ def scheirer_ray_hare(
     Scheirer, Ray and Hare, "The analysis of ranked data derived from completely randomized factorial designs",
     *Biometrics* 32 (1976) 429-434; Sokal and Rohlf, *Biometry*, 3rd edition (1995), section 13.12.
     """
-    import pandas as pd
-    from scipy import stats
-
     data = pd.DataFrame({"y": np.asarray(answers, float), "a": np.asarray(first), "b": np.asarray(second)}).dropna()
     name, n = "Scheirer-Ray-Hare", len(data)
 
@@ -222,8 +217,6 @@ def wilcoxon(first: ArrayLike, second: ArrayLike) -> TestResult:
         The statistic W is the smaller sum of ranks; `n` counts the pairs that differ; the effect is positive where
         `first` is larger.
     """
-    from scipy import stats
-
     differences = np.asarray(first, float) - np.asarray(second, float)
     differences = differences[~np.isnan(differences)]
     name, differing = "Wilcoxon", int((differences != 0).sum())
@@ -256,8 +249,6 @@ def friedman(blocks: ArrayLike) -> TestResult:
         A participant's mean answer by method. Rows with a NaN are left out. With two columns it is a sign test,
         weaker than Wilcoxon's.
     """
-    from scipy import stats
-
     table = np.asarray(blocks, float)
     table = np.round(table[~np.isnan(table).any(axis=1)], 10)
     name, (n, k) = "Friedman", table.shape
@@ -291,8 +282,6 @@ def dunn(groups: Sequence[ArrayLike]) -> dict[tuple[int, int], TestResult]:
     Dunn, "Multiple comparisons using rank sums", *Technometrics* 6 (1964) 241-252. With two groups z² is exactly
     the H of Kruskal and Wallis. Correct with `signface.study.statistics.test_result.holm`.
     """
-    from scipy import stats
-
     arrays = [values[~np.isnan(values)] for values in (np.asarray(group, float) for group in groups)]
     together = np.concatenate(arrays)
     variance = stats.rankdata(together).var(ddof=1) if len(together) > 1 else 0.0

@@ -17,16 +17,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from signface.content import Content
 from signface.errors import SignfaceError
 from signface.study.responses import PERSONAL, QUESTIONS, REQUIRED, SCALES
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 EXPRESSIONS = ("A", "D", "F", "J", "Sa", "Su")
 
@@ -101,8 +98,6 @@ class Effects:
 
 def crossed_design(name: str, methods: Sequence[str], questions: Sequence[str], participants: int) -> Design:
     """Six expressions, three intensities, every method: 18 films a method, as in thesis 6.1."""
-    import pandas as pd
-
     rows = [
         {
             "stimulus": f"{expression}{intensity}_{method}",
@@ -151,7 +146,6 @@ def study_design(name: str) -> Design:
     """
     if not Path(name).exists():
         return thesis_design(name)
-    import pandas as pd
 
     from signface.study.design import read_study
 
@@ -211,8 +205,6 @@ def simulate(
     SignfaceError
         An effect names a method or a question that the design does not have, or there is no participant.
     """
-    import pandas as pd
-
     effects = effects or Effects()
     methods = sorted(design.stimuli["method"].unique())
     for method, question in effects.methods:

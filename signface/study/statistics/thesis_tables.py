@@ -15,18 +15,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from signface.study.responses import FACTORS, SCALES, Responses, order_expressions
 from signface.study.statistics.contingency import chi_square
 from signface.study.statistics.rank_tests import kruskal_wallis, scheirer_ray_hare, wilcoxon
 from signface.study.statistics.tables import StudyTable
 from signface.study.statistics.test_result import TestResult, holm, verdict
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 #: question: what its null hypothesis says (thesis 6.3.1 and 6.4.1).
 HYPOTHESES = {
@@ -45,8 +42,6 @@ INDEPENDENCE = (
 
 def means_table(responses: Responses) -> StudyTable:
     """Means of every question by method (form of tables 6.6 and 6.9); accuracy is the share recognised."""
-    import pandas as pd
-
     rows = []
     for column, name in responses.questions.items():
         means = responses.table.groupby("method")[column].mean()
@@ -77,8 +72,6 @@ def right_and_wrong(table: pd.DataFrame, factor: str) -> np.ndarray:
 
 def hypotheses_table(responses: Responses) -> StudyTable:
     """One row per question: its null hypothesis tested between all methods (form of tables 6.2, 6.3, 6.7)."""
-    import pandas as pd
-
     columns = list(responses.questions)
     results = [test_methods(responses, column) for column in columns]
     corrected = holm([result.p for result in results])
@@ -150,8 +143,6 @@ def pairwise_results(responses: Responses, column: str) -> dict[tuple[str, str],
 
 def pairwise_table(responses: Responses) -> StudyTable:
     """Every pair of methods, every question, with Holm's correction within a question (forms of 6.4 and 6.8)."""
-    import pandas as pd
-
     rows = []
     for column, name in responses.questions.items():
         results = pairwise_results(responses, column)
@@ -174,8 +165,6 @@ def pairwise_table(responses: Responses) -> StudyTable:
 
 def pairwise_matrix(responses: Responses) -> StudyTable:
     """The uncorrected p-values of `pairwise_table` laid out as in tables 6.4 and 6.8."""
-    import pandas as pd
-
     methods, rows = responses.methods, []
     for column, name in responses.questions.items():
         results = pairwise_results(responses, column)
@@ -203,8 +192,6 @@ def interactions_table(
     key, title, reference : str
         Of the table.
     """
-    import pandas as pd
-
     varying, rows, violated = responses.factors(), [], []
     for first, second in pairs:
         if first not in varying or second not in varying:
@@ -231,8 +218,6 @@ def interactions_table(
 
 def expression_means(responses: Responses, *, by_method: bool = False) -> StudyTable:
     """Means of every question by played expression (form of A.3 and A.6), or by method and expression."""
-    import pandas as pd
-
     groups = ["method", "expression"] if by_method else ["expression"]
     rows = []
     for column, name in responses.questions.items():
@@ -248,8 +233,6 @@ def expression_means(responses: Responses, *, by_method: bool = False) -> StudyT
 
 def confusions(responses: Responses) -> dict[str, pd.DataFrame]:
     """Method to counts of answers: rows are what was played, columns what was answered (figures 6.3 and 6.6)."""
-    import pandas as pd
-
     answered = responses.table.dropna(subset=["answer_expression"])
     labels = order_expressions(sorted({*answered["expression"], *answered["answer_expression"]}))
     played = [label for label in labels if label in set(answered["expression"])]
