@@ -8,10 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from signface.cli.options import add_solve_arguments, settings_from
+from signface.cli.options import add_settings_arguments, add_solve_arguments, settings_from
 from signface.errors import SignfaceError
 from signface.progress import progress
 from signface.settings.solve import SolveSettings
+from signface.settings.training import TrainingSettings
 
 if TYPE_CHECKING:
     pass
@@ -57,12 +58,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME_OR_FILE",
         help="the classifier in use so far (default: %(default)s)",
     )
-    learn.add_argument("--classifier", default="forest", metavar="NAME", help="what to train (default: %(default)s)")
     learn.add_argument(
         "--with", dest="others", action="append", default=[], type=Path, metavar="CORPUS",
         help="train on this corpus as well; may be repeated",
     )  # fmt: skip
-    learn.add_argument("--seed", type=int, default=0, help="default: %(default)s")
+    add_settings_arguments(learn, TrainingSettings)
     add_solve_arguments(learn)
 
     agree = action(
@@ -156,7 +156,6 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
         raise SignfaceError("the ending of a classifier is .skops", file=arguments.output)
 
     from signface.learn.relearning import learn_corrections
-    from signface.settings.training import TrainingSettings
 
     solve = settings_from(arguments, SolveSettings)
 
@@ -170,7 +169,7 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
     learnt = learn_corrections(
         solved(arguments.corpus),
         load_model(arguments.before),
-        TrainingSettings(classifier=arguments.classifier, seed=arguments.seed, calibrate=False),
+        settings_from(arguments, TrainingSettings, TrainingSettings(calibrate=False)),
         others=[example for folder in arguments.others for example in solved(folder)],
         solve=solve,
         corpus=" + ".join(folder.resolve().name for folder in (arguments.corpus, *arguments.others)),

@@ -5,12 +5,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from signface.cli.options import add_solve_arguments, settings_from, words
-from signface.cli.train import add_tier_arguments, add_training_arguments, tier_options, training_settings
+from signface.cli.options import add_settings_arguments, add_solve_arguments, settings_from, words
+from signface.cli.train import add_tier_arguments, tier_options
 from signface.errors import SignfaceError
 from signface.progress import progress
 from signface.settings.choices import NAMES, SEQUENCE_NAMES
 from signface.settings.solve import SolveSettings
+from signface.settings.training import TrainingSettings
 
 EXAMPLE = """  signface evaluate corpora/feel -o reports/feel
   signface evaluate corpora/feel -o reports/feel --train-kinds IE,SE,EU --protocol across --classifiers net-hsmm"""
@@ -57,10 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=list(NAMES),
         help=f"those of the thesis ({','.join(NAMES)}, the default) or sequence models ({','.join(SEQUENCE_NAMES)})",
     )
-    add_training_arguments(parser)
-    parser.add_argument(
-        "--calibrate", action="store_true", help="calibrate confidences, by folds of the training takes"
-    )
+    add_settings_arguments(parser, TrainingSettings, without=("classifier",))
     parser.add_argument(
         "--learning-curve",
         action="store_true",
@@ -69,7 +67,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--date", metavar="WORDS", help="date to print on the report (default: none, so that its bytes repeat)"
     )
-    parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")
     add_tier_arguments(parser)
     add_solve_arguments(parser)
 
@@ -87,7 +84,8 @@ def run(arguments: argparse.Namespace) -> None:
             f"there is no classifier named {unknown[0]}" if unknown else "no classifier is named",
             hint=f"choose among {', '.join(NAMES | SEQUENCE_NAMES)}",
         )
-    settings = training_settings(arguments)
+    # Calibrating trains five times more: here it is asked for, not usual.
+    settings = settings_from(arguments, TrainingSettings, TrainingSettings(calibrate=False))
     solve = settings_from(arguments, SolveSettings)
     if arguments.output.exists() and not arguments.output.is_dir():
         raise SignfaceError("is a file, not a folder", file=arguments.output, hint="name a folder for the report")

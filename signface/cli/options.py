@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Collection, Mapping
-from dataclasses import MISSING, Field, fields
+from dataclasses import MISSING, Field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -104,24 +104,22 @@ def _default_words(item: Field[Any]) -> str:
     return f" (default: {','.join(default) if isinstance(default, tuple) else default})"
 
 
-def settings_from(arguments: argparse.Namespace, kind: type[Decision]) -> Decision:
-    """The settings that the command line asked for: its options over the laboratory's TOML over the defaults.
+def settings_from(arguments: argparse.Namespace, kind: type[Decision], usual: Decision | None = None) -> Decision:
+    """The settings that the command line asked for: its options over the laboratory's TOML over what is usual.
 
     Raises
     ------
     SignfaceError
         The TOML is missing or wrong, or a value is outside its range.
     """
-    chosen = {
-        name.removeprefix(f"{kind.TABLE}_"): value
-        for name, value in vars(arguments).items()
-        if name.startswith(f"{kind.TABLE}_")
-    }
-    if getattr(arguments, "settings", None) is None:
-        return kind(**chosen)
-    from signface.settings.laboratory import read_settings
+    given = {item.name: f"{kind.TABLE}_{item.name}" for item in fields(kind)}  # type: ignore[arg-type]
+    chosen = {name: getattr(arguments, option) for name, option in given.items() if hasattr(arguments, option)}
+    base: Any = kind() if usual is None else usual
+    if getattr(arguments, "settings", None) is not None:
+        from signface.settings.laboratory import Laboratory, read_settings
 
-    base: Any = getattr(read_settings(arguments.settings), kind.TABLE)
+        laboratory = read_settings(arguments.settings, replace(Laboratory(), **{kind.TABLE: base}))
+        base = getattr(laboratory, kind.TABLE)
     return base.changed(**chosen)
 
 

@@ -3,50 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from signface.cli.options import add_solve_arguments, settings_from, words
+from signface.cli.options import add_settings_arguments, add_solve_arguments, settings_from, words
 from signface.errors import SignfaceError
 from signface.progress import progress
-from signface.settings.choices import NAMES, SEQUENCE_NAMES
 from signface.settings.solve import SolveSettings
-
-if TYPE_CHECKING:
-    from signface.settings.training import TrainingSettings
+from signface.settings.training import TrainingSettings
 
 EXAMPLE = """  signface train corpora/feel -o mine.skops
   signface train corpora/feel -o mine.skops --classifier svm-rbf --kinds IE,SE --signer each
   signface train corpora/lab -o brows.skops --tier brows --vocabulary brows.txt
   signface train corpora/feel -o mine.skops --normalise signer --features weights,windows --search"""
-
-
-def add_training_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what `train` and `evaluate` can be told of how classifiers are trained."""
-    parser.add_argument(
-        "--features",
-        type=words,
-        default=["weights"],
-        metavar="NAMES",
-        help="what classifiers of segments see: weights (the default), derivatives, windows, or several of them",
-    )
-    parser.add_argument(
-        "--normalise",
-        default="none",
-        choices=("none", "signer"),
-        help="signer: weights less the signer's mean, over their spread, from all takes of the signer at hand",
-    )
-    parser.add_argument(
-        "--aggregate",
-        default="mean",
-        choices=("mean", "frames"),
-        help="label a segment by its mean descriptor (default, as in the thesis) or by all of its frames",
-    )
-    parser.add_argument("--balanced", action="store_true", help="let every label weigh the same in training")
-    parser.add_argument(
-        "--search", action="store_true", help="look for the best parameters, by folds of the training takes"
-    )
 
 
 def add_tier_arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,19 +46,10 @@ def tier_options(arguments: argparse.Namespace) -> dict[str, Any]:
     return {"tier": arguments.tier, "vocabulary": vocabulary, "sparse": arguments.sparse}
 
 
-def training_settings(arguments: argparse.Namespace) -> TrainingSettings:
-    """The settings that a command was given, of `add_training_arguments`, `--classifier`, `--calibrate`, `--seed`."""
-    from signface.settings.training import TrainingSettings
-
-    names = [item.name for item in fields(TrainingSettings) if hasattr(arguments, item.name)]
-    return TrainingSettings(**{name: getattr(arguments, name) for name in names})
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Fill the parser of this command."""
     parser.add_argument("corpus", type=Path, metavar="CORPUS", help="folder of a corpus")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="MODEL", help="a .skops file")
-    parser.add_argument("--classifier", default="forest", choices=NAMES | SEQUENCE_NAMES, help="default: %(default)s")
     parser.add_argument("--kinds", type=words, metavar="IE,SE", help="kinds of takes to train on (default: all)")
     parser.add_argument(
         "--signer",
@@ -97,14 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="one signer, all of them together (default), or each: one classifier a signer, MODEL-NAME.skops",
     )
-    add_training_arguments(parser)
-    parser.add_argument(
-        "--calibrate",
-        action=argparse.BooleanOptionalAction,
-        default=True,
-        help="train on parts of the takes too, to score the rest and to calibrate confidences (default: yes)",
-    )
-    parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")
+    add_settings_arguments(parser, TrainingSettings)
     add_tier_arguments(parser)
     add_solve_arguments(parser)
 
@@ -119,7 +72,7 @@ def run(arguments: argparse.Namespace) -> None:
     output = arguments.output
     if output.suffix.lower() != ".skops":
         raise SignfaceError("the ending of a classifier is .skops", file=output)
-    settings, solve = training_settings(arguments), settings_from(arguments, SolveSettings)
+    settings, solve = settings_from(arguments, TrainingSettings), settings_from(arguments, SolveSettings)
     whole = read_corpus(arguments.corpus)
     one = None if arguments.signer in ("all", "each") else [arguments.signer]
     corpus = whole.select(kinds=arguments.kinds, signers=one)

@@ -28,8 +28,14 @@ class Laboratory:
     eaf: EafOptions = field(default_factory=EafOptions)
 
 
-def read_settings(path: str | PathLike[str]) -> Laboratory:
+def read_settings(path: str | PathLike[str], usual: Laboratory | None = None) -> Laboratory:
     """A laboratory's settings from a TOML with the tables `[solve]`, `[train]` and `[eaf]`, none of them required.
+
+    Parameters
+    ----------
+    path : path
+    usual : Laboratory, optional
+        What holds where the file says nothing; the defaults of all settings when not given.
 
     Raises
     ------
@@ -56,10 +62,11 @@ def read_settings(path: str | PathLike[str]) -> Laboratory:
     for name, table in content.items():
         if name not in tables or not isinstance(table, dict):
             raise SignfaceError(f"has no table [{name}]", file=file, hint=f"its tables are {', '.join(tables)}")
-    made = {
-        name: kind.from_dict(_with_paths(kind, content.get(name, {}), file.parent), file=file)
-        for name, kind in tables.items()
-    }
+    usual = Laboratory() if usual is None else usual
+    made = {}
+    for name, kind in tables.items():
+        stated = _with_paths(kind, content.get(name, {}), file.parent)
+        made[name] = kind.from_dict({**getattr(usual, name).as_dict(), **stated}, file=file)
     return Laboratory(**made)  # type: ignore[arg-type]
 
 

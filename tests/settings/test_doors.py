@@ -50,6 +50,11 @@ SOLVING = [
     ("elan", "learn", ()),
     ("study", "render", ("method", "alpha")),  # --methods names several of both
 ]
+TRAINING = [
+    ("train", None, ()),
+    ("evaluate", None, ("classifier",)),  # --classifiers names several
+    ("elan", "learn", ()),
+]
 WRITING = [("annotate", None, ()), ("corpus", "run", ())]
 
 
@@ -64,7 +69,9 @@ def parser_of(command: str, action: str | None) -> argparse.ArgumentParser:
 
 @pytest.mark.parametrize(
     ("command", "action", "without", "kind"),
-    [(*door, SolveSettings) for door in SOLVING] + [(*door, EafOptions) for door in WRITING],
+    [(*door, SolveSettings) for door in SOLVING]
+    + [(*door, TrainingSettings) for door in TRAINING]
+    + [(*door, EafOptions) for door in WRITING],
 )
 def test_every_door_knows_every_setting(command, action, without, kind):
     known = {option.dest: option for option in parser_of(command, action)._actions}
