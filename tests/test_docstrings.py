@@ -21,7 +21,24 @@ MODULES = sorted(
 )
 
 
-@pytest.mark.parametrize("name", MODULES)
+#: Modules whose examples solve several takes, train, or compile.
+SLOW = {
+    "signface.annotation",
+    "signface.corpus.checking",
+    "signface.corpus.examples",
+    "signface.corpus.running",
+    "signface.evaluation.measure",
+    "signface.label.persistence",
+    "signface.render.film",
+    "signface.report.evaluation.report",
+    "signface.solver.solving",
+    "signface.solver.thin_shell",
+}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else []) for name in MODULES]
+)
 def test_examples_run(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     found = doctest.testmod(importlib.import_module(name), optionflags=OPTIONS)

@@ -55,6 +55,7 @@ def doubles(*shape):
     return arrays.arrays(np.uint64, shape).map(lambda bits: bits.view(np.float64))
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(
     weights=doubles(7, 3),

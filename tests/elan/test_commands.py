@@ -237,6 +237,7 @@ def play_elan(folder: Path, parameters: dict[str, str]) -> tuple[list[str], int]
     return done.stdout.decode("utf-8").splitlines(), done.returncode
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="ELAN runs the .bat there")
 def test_elan_runs_the_recogniser_in_a_bare_environment(tmp_path, machine):
     take = tmp_path / "Aufnahme ü 1.csv"

@@ -340,6 +340,7 @@ def test_files_of_before_28_become_30_with_all_they_hold(tmp_path, version, mapp
     assert [row[2] for row in read_back(old, "Gloss")] == [" HAUS  ü ", ""]
 
 
+@pytest.mark.slow
 def test_five_thousand_annotations_stay_when_others_go_in(tmp_path):
     big = tmp_path / "big.eaf"
     write_eaf(labelled(" ".join(["N", "NJ", "J", "JN"] * 1250), step=0.25), big, signer="S1")

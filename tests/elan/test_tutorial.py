@@ -104,6 +104,7 @@ def test_the_tutorial_can_be_followed(place):
     assert list(place.glob("agreement/*.png"))
 
 
+@pytest.mark.slow
 def test_corrected_files_are_not_written_over(place):
     environment = {"PATH": f"{place / 'bin'}:/usr/bin:/bin", "PYTHONPATH": str(ROOT), "HOME": str(place)}
     command = ["signface", "annotate", "mine/M1_EU_11.c3d", "-o", "mine/M1_EU_11.eaf", "--signer", "M1"]

@@ -83,6 +83,7 @@ def test_answers_do_not_depend_on_the_references_of_the_test_takes(examples):
     assert wrong["accuracy"] < 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_metrics_have_the_agreed_form(examples, protocol):
     metrics = evaluate_folds(folds(examples, protocol)).metrics

@@ -10,6 +10,7 @@ from signface.face.reading import read_face, read_identities
 from signface.face.suggestion import suggest_layout
 
 
+@pytest.mark.slow
 def test_markers_of_another_head_in_another_frame_come_near_their_places():
     face = read_face("default")
     layout = read_layout("default-40", face)

@@ -150,6 +150,7 @@ def test_an_evaluation_normalises_signers_by_their_test_takes():
     assert sure != label_spans(tested.descriptors, spans, model)[1]
 
 
+@pytest.mark.slow
 def test_annotate_normalises_by_all_takes_that_it_is_given(tmp_path):
     takes = [e for e in corpus() if e.kind == "IE"]
     save_model(train(takes, quick("forest", normalise="signer")), tmp_path / "m.skops")

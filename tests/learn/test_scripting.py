@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import shutil
 
+import pytest
+
 from signface.label.persistence import load_model
 from tests.conftest import REPOSITORY
 
@@ -14,6 +16,7 @@ def scripts():
     return re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
 
 
+@pytest.mark.slow
 def test_the_script_of_the_documentation_trains_compares_and_saves(tmp_path, monkeypatch, capsys):
     script, _ = scripts()
     work = [line for line in script.splitlines() if line and not line.startswith(("from ", "import "))]

@@ -20,6 +20,7 @@ def material(face, actors):
     return Material(face, actors, Rules())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_gives_the_number_asked_for_symmetric_and_apart(face, material, method):
     layout = choose(material, method, 15)

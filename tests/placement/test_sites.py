@@ -57,6 +57,7 @@ def test_landmarks_follow_the_shape_of_another_head(face):
     assert 1.0 < moved.mean() < 15.0
 
 
+@pytest.mark.slow
 def test_landmarks_are_found_on_a_face_of_another_topology(face):
     """The same head with its vertices in another order, seen from another origin."""
     order = np.random.default_rng(0).permutation(len(face.mesh.vertices))
@@ -80,6 +81,7 @@ def test_an_unknown_empirical_layout_is_named(face):
         place_layout("man-99", face)
 
 
+@pytest.mark.slow
 def test_sites_are_allowed_moving_and_mirrored(face, sites):
     rules = Rules()
     out = forbidden(face, rules)

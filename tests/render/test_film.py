@@ -46,6 +46,7 @@ def atoms_of(data: bytes) -> list[str]:
     return names
 
 
+@pytest.mark.slow
 def test_a_film_has_its_index_first_and_as_many_pictures_as_asked(avatar, face, tmp_path):
     file = tmp_path / "film.mp4"
     assert write_film(file, pictures_of(avatar, opening(face)), 25) == 12
@@ -230,6 +231,7 @@ def test_pictures_side_by_side_keep_their_places():
     assert not np.array_equal(captioned[:, 32:], right)
 
 
+@pytest.mark.slow
 def test_the_command_renders_methods_together_and_beside_a_video(face, tmp_path, monkeypatch, capsys, mini):
     from signface.cli.main import main
 

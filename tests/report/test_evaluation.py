@@ -201,6 +201,7 @@ def test_one_signer_and_a_take_in_which_nothing_is_found(tmp_path):
     assert Elements(page).wrong == []
 
 
+@pytest.mark.slow
 def test_a_classifier_without_importance_or_curve_is_named(both):
     metrics = json.loads(json.dumps(both.metrics))
     metrics["importance"], metrics["learning_curve"] = {}, {"within": [], "across": []}

@@ -37,6 +37,7 @@ def test_numpy_says_what_pytorch_says():
     assert recurrent_outputs(stacked, features) == pytest.approx(np.array(theirs), abs=1e-5)
 
 
+@pytest.mark.slow
 def test_one_seed_gives_one_network_and_another_seed_another(takes):
     pytest.importorskip("torch")
     first, second, other = (barely_trained(takes[:6], seed=seed).weights_ for seed in (1, 1, 2))

@@ -108,6 +108,7 @@ def test_sequence_models_are_estimators_that_clone(name):
     assert repr(clone(one)) == repr(one)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["net-hsmm", "crf"])
 def test_neither_a_second_training_nor_the_order_of_takes_changes_anything(name, takes):
     first, second = (train(order, quick(name, seed=1)) for order in (takes[:6], takes[5::-1]))

@@ -171,6 +171,7 @@ def test_a_head_pose_that_is_a_little_off_makes_no_expression(face, layout):
     assert loose < 0.5 * strict
 
 
+@pytest.mark.slow
 def test_the_quick_and_the_sure_method_agree_on_wild_frames():
     """Frames that have nothing to do with one another, far out of bounds, and bases that are nearly dependent."""
     rng = np.random.default_rng(1)

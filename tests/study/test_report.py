@@ -69,6 +69,7 @@ class Page(HTMLParser):
             assert self.open.pop() == tag
 
 
+@pytest.mark.slow
 def test_every_table_of_the_thesis_has_its_form(study):
     references = " ".join(table.reference for table in study.tables)
     for number in (
@@ -124,6 +125,7 @@ def test_the_page_stands_alone_and_is_well_formed(study):
     assert page.fetched == []
 
 
+@pytest.mark.slow
 def test_answers_of_nobody_are_marked_in_every_output(study, tmp_path):
     report = write_report(study, tmp_path)
     page = report.read_text(encoding="utf-8")
@@ -135,6 +137,7 @@ def test_answers_of_nobody_are_marked_in_every_output(study, tmp_path):
         assert "SIMULATED ANSWERS" in file.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_answers_of_people_are_not_marked(real, tmp_path):
     page = write_report(real, tmp_path).read_text(encoding="utf-8")
     assert "SIMULATED" not in page
@@ -143,6 +146,7 @@ def test_answers_of_people_are_not_marked(real, tmp_path):
         assert "simulated" not in pd.read_csv(file)
 
 
+@pytest.mark.slow
 def test_names_from_a_csv_cannot_put_markup_into_the_page(real):
     table = real.responses.table.replace({"method": {"FS": "<script>alert(1)</script>"}})
     page = report_html(analyse(validate(table, name="x.csv"), resamples=100), title="<i>study</i>")
@@ -151,6 +155,7 @@ def test_names_from_a_csv_cannot_put_markup_into_the_page(real):
     assert "&lt;script&gt;" in page
 
 
+@pytest.mark.slow
 def test_methods_with_awkward_names_have_files_of_their_own(tmp_path):
     table = simulate(thesis_design("group-1"), participants=5).replace(
         {"LSTS30": "../x", "LSTS50": "..:x", "LSTS70": "$x" * 150}
@@ -161,11 +166,13 @@ def test_methods_with_awkward_names_have_files_of_their_own(tmp_path):
     assert {file.name for file in tmp_path.iterdir()} == {"out"}
 
 
+@pytest.mark.slow
 def test_two_runs_write_the_same_bytes(real, tmp_path):
     first, second = write_report(real, tmp_path / "a"), write_report(real, tmp_path / "b")
     assert first.read_bytes() == second.read_bytes()
 
 
+@pytest.mark.slow
 def test_screenshots_are_put_into_the_page(real, tmp_path):
     dot = bytes.fromhex(
         "89504e470d0a1a0a0000000d4948445200000001000000010802000000907753de0000000c49444154789c63f8cfc0000003010100c9fe92ef"
@@ -228,6 +235,7 @@ def test_cells_are_written_as_a_reader_expects():
     assert as_text(StudyTable("k", "T", pd.DataFrame({"q": ["a"], "x": [1.5]}))).splitlines()[-1] == "a  1.500"
 
 
+@pytest.mark.slow
 def test_from_a_design_to_a_report_by_command(tmp_path, capsys):
     answers = tmp_path / "answers.csv"
     run("simulate", "group-2b", "-o", str(answers), "--participants", "8", "--effect", "FS:fidelity=-1", "--seed", "3")

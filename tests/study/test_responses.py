@@ -123,6 +123,7 @@ def test_a_participant_has_one_age():
     assert "more than one age" in refusal(table)
 
 
+@pytest.mark.slow
 def test_two_groups_make_one_study_of_different_people():
     first = validate(answers(), name="2a.csv")
     second = validate(
@@ -164,6 +165,7 @@ def test_answers_of_nobody_are_recognised():
     assert validate(mixed).simulated
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "damage",
     [
