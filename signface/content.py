@@ -37,6 +37,13 @@ class Content:
             return NotImplemented
         return all(_same(mine, theirs) for mine, theirs in zip(_contents(self), _contents(other), strict=True))
 
+    def _hold(self, **values: Any) -> None:
+        """Set fields while the object is made; arrays become read-only."""
+        for name, value in values.items():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
     def __hash__(self) -> int:
         return hash((type(self), *map(_key, _contents(self))))
 

@@ -44,8 +44,7 @@ class Descriptors(TimedArrays, Content):
         (weights that came straight from a phone).
     head : (F, 4, 4) float64 array, optional
         Pose of the head relative to its neutral frame: maps a point of the neutral head to its place in the
-        recording, millimetres. The identity throughout when unknown; NaN in single frames
-        in which it is.
+        recording, millimetres. The identity throughout when unknown; NaN in single frames in which it is.
     name : str
         Name of the take.
     history : tuple of str
@@ -104,17 +103,9 @@ class Descriptors(TimedArrays, Content):
             deviation = np.array(self.deviation, dtype=np.float64)
             if deviation.shape != weights.shape:
                 raise SignfaceError(f"deviations of shape {deviation.shape} do not match weights of {weights.shape}")
-            deviation.setflags(write=False)
-            object.__setattr__(self, "deviation", deviation)
-        for array in (weights, residual, head):
-            array.setflags(write=False)
-        object.__setattr__(self, "weights", weights)
-        object.__setattr__(self, "names", names)
-        object.__setattr__(self, "rate", float(self.rate))
-        object.__setattr__(self, "start", float(self.start))
-        object.__setattr__(self, "residual", residual)
-        object.__setattr__(self, "head", head)
-        object.__setattr__(self, "history", tuple(self.history))
+            self._hold(deviation=deviation)
+        rate, start, history = float(self.rate), float(self.start), tuple(self.history)
+        self._hold(weights=weights, names=names, rate=rate, start=start, residual=residual, head=head, history=history)
 
     @property
     def n_frames(self) -> int:
@@ -148,10 +139,6 @@ class Descriptors(TimedArrays, Content):
         if name not in self.names:
             raise SignfaceError(f"{self.name}: no base named {name}", hint=f"the bases are {', '.join(self.names)}")
         return self.names.index(name)
-
-    def changed(self, operation: str, **fields: object) -> Descriptors:
-        """A copy with some fields replaced and `operation` appended to its history."""
-        return replace(self, history=(*self.history, operation), **fields)  # type: ignore[arg-type]
 
     def columns(self) -> dict[str, np.ndarray]:
         """(F,) numbers under the names of a weights file: `time_s`, one per base, `head_*`, `residual_mm`.

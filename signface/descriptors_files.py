@@ -23,17 +23,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
-from signface.columns import (
-    DEVIATION,
-    POSE,
-    POSE_MATRIX,
-    RESIDUAL,
-    TIME,
-    WORDS,
-    base_column,
-    base_of,
-    poses_of,
-)
+from signface.columns import DEVIATION, POSE, POSE_MATRIX, RESIDUAL, TIME, WORDS, base_column, base_of, poses_of
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.files import whole_file

@@ -1,6 +1,7 @@
-"""Files that appear whole or not at all, and the folder of data that ships with signface.
+"""Files read and written, whole or not at all, and the folder of data that ships with signface.
 
 - `whole_file`: write beside the target, then rename over it.
+- `reading`: what goes wrong where a file is read, as an error that names it.
 - `DATA`, `models_folder`, `shipped`, `bundled_corpus`: where the data live that ship.
 """
 
@@ -72,6 +73,25 @@ def whole_file(
         temporary.replace(target)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def reading(file: Path) -> Iterator[None]:
+    """Say of a file that is read in the block what is wrong with it.
+
+    Raises
+    ------
+    SignfaceError
+        The file is missing, cannot be read, or is no text where text is read.
+    """
+    try:
+        yield
+    except FileNotFoundError as error:
+        raise SignfaceError("no such file", file=file) from error
+    except OSError as error:
+        raise SignfaceError(f"cannot be read ({error.strerror or 'input error'})", file=file) from error
+    except UnicodeDecodeError as error:
+        raise SignfaceError("cannot be read as text", file=file) from error
 
 
 def models_folder() -> Path:

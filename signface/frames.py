@@ -104,14 +104,16 @@ class TimedArrays(Timed):
                 hint=f"the take goes from {self.start:.3f} to {last:.3f} s",
             )
         note = f"between {start_s:g} and {end_s:g} s"
-        return replace(  # type: ignore[type-var]
-            self, start=self.start + begin / self.rate, history=(*self.history, note), **self._rows(begin, end)
-        )
+        return self.changed(note, start=self.start + begin / self.rate, **self._rows(begin, end))
+
+    def changed(self, operation: str, **values: object) -> Self:
+        """A copy with some fields replaced and `operation` appended to its history."""
+        return replace(self, history=(*self.history, operation), **values)  # type: ignore[type-var]
 
     def _frame_from(self, seconds: float) -> int:
         """The first frame that is not before a time; nan is after all."""
-        place = (seconds - self.start) * self.rate - CUT_SLACK
-        return int(np.ceil(np.nan_to_num(min(max(place, 0.0), self.n_frames), nan=self.n_frames)))
+        frame = (seconds - self.start) * self.rate - CUT_SLACK
+        return int(np.ceil(np.nan_to_num(min(max(frame, 0.0), self.n_frames), nan=self.n_frames)))
 
     def _rows(self, begin: int, end: int) -> dict[str, Any]:
         """The fields that change when only these frames stay."""
@@ -120,11 +122,7 @@ class TimedArrays(Timed):
 
 
 def runs(mask: np.ndarray) -> np.ndarray:
-    """(R, 2) first frame and frame after the last of each run of True.
-
-    Parameters
-    ----------
-    mask : (F,) bool array
+    """(R, 2) first frame and frame after the last of each run of True in an (F,) bool array.
 
     Examples
     --------
@@ -136,11 +134,7 @@ def runs(mask: np.ndarray) -> np.ndarray:
 
 
 def stretches(values: np.ndarray) -> np.ndarray:
-    """(R, 2) first frame and frame after the last of each stretch of one value; together all frames.
-
-    Parameters
-    ----------
-    values : (F,) array
+    """(R, 2) first frame and frame after the last of each stretch of one value in an (F,) array; together all frames.
 
     Examples
     --------
@@ -191,10 +185,10 @@ class Means:
         return (self._until(end) - self._until(start)) / (end - start)[:, None]
 
     def _until(self, time: np.ndarray) -> np.ndarray:
-        place = time * self.rate
-        inside = place.clip(0, len(self.values))
+        frame = time * self.rate
+        inside = frame.clip(0, len(self.values))
         whole = np.minimum(inside.astype(int), len(self.values) - 1)
-        part = (inside - whole)[:, None]
-        total = self.integral[whole] + part * self.values[whole] / self.rate
-        before, after = (place - inside).clip(max=0)[:, None], (place - inside).clip(min=0)[:, None]
+        share = (inside - whole)[:, None]
+        total = self.integral[whole] + share * self.values[whole] / self.rate
+        before, after = (frame - inside).clip(max=0)[:, None], (frame - inside).clip(min=0)[:, None]
         return total + (before * self.values[0] + after * self.values[-1]) / self.rate

@@ -52,8 +52,7 @@ class SignerBases(Content):
             raise SignfaceError(f"{len(self.bases)} bases of a signer do not match displacements of {places.shape}")
         if not np.isfinite(places).all():
             raise SignfaceError("has cells that are not numbers", file=self.source or None)
-        places.setflags(write=False)
-        object.__setattr__(self, "displacements", places)
+        self._hold(displacements=places)
 
     @classmethod
     def read(cls, path: str | PathLike[str]) -> SignerBases:

@@ -22,14 +22,7 @@ from typing import TYPE_CHECKING
 
 from signface.corpus.describing import stored_or_solved
 from signface.corpus.manifest import TakeEntry
-from signface.corpus.origin import (
-    SOLVING_CODE,
-    Recipe,
-    code_digest,
-    find_origin,
-    shipped_digest,
-    take_name,
-)
+from signface.corpus.origin import SOLVING_CODE, Recipe, code_digest, find_origin, shipped_digest, take_name
 from signface.corpus.store import DescriptorStore
 from signface.errors import SignfaceError
 from signface.files import whole_file

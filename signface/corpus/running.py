@@ -25,14 +25,7 @@ from signface.corpus.cluster import WorkerDied, on_cluster, on_cores
 from signface.corpus.describing import recipe_of
 from signface.corpus.jobs import ANNOTATING_CODE, FAILED, LOGS, Job, Outcome, annotate_job, solve_job, write_log
 from signface.corpus.manifest import Corpus, TakeEntry
-from signface.corpus.origin import (
-    Recipe,
-    code_digest,
-    find_origin,
-    make_recipe,
-    shipped_digest,
-    take_name,
-)
+from signface.corpus.origin import Recipe, code_digest, find_origin, make_recipe, shipped_digest, take_name
 from signface.corpus.signers import find_signer
 from signface.corpus.store import DescriptorStore
 from signface.elan.mapping import read_mapping

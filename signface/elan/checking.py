@@ -19,20 +19,8 @@ from pathlib import Path
 
 from lxml import etree
 
-from signface.elan.document import read_document
+from signface.elan.document import NAMES, parent_annotations, read_document
 from signface.errors import SignfaceError
-
-#: Attribute that identifies an element, for those whose identifiers must be unique among their like.
-NAMES = {
-    "TIER": "TIER_ID",
-    "LINGUISTIC_TYPE": "LINGUISTIC_TYPE_ID",
-    "CONTROLLED_VOCABULARY": "CV_ID",
-    "LANGUAGE": "LANG_ID",
-    "EXTERNAL_REF": "EXT_REF_ID",
-    "LEXICON_REF": "LEX_REF_ID",
-    "LOCALE": "LANGUAGE_CODE",
-    "CONSTRAINT": "STEREOTYPE",
-}
 
 
 @dataclass(frozen=True)
@@ -79,8 +67,8 @@ def check_file(path: str | PathLike[str], *, media_s: float | None = None) -> Fi
 
     Examples
     --------
-    >>> from signface.files import bundled_corpus
-    >>> check_file(bundled_corpus() / "reference" / "M1_IE_J.eaf").problems
+    >>> import signface as sf
+    >>> check_file(sf.datasets.mini_file().with_name("reference") / "M1_IE_J.eaf").problems
     ()
     """
     root = read_document(path).getroot()
@@ -130,11 +118,8 @@ def _duplicates(root: etree._Element) -> Iterator[str]:
                 yield f"a {tag} has no {attribute}"
             elif count > 1:
                 yield f"{count} elements {tag} have the name {name}"
-    identifiers: Counter[str | None] = Counter()
-    for slot in root.iterfind("TIME_ORDER/TIME_SLOT"):
-        identifiers[slot.get("TIME_SLOT_ID")] += 1
-    for annotation in root.iterfind("TIER/ANNOTATION/*"):
-        identifiers[annotation.get("ANNOTATION_ID")] += 1
+    identifiers = Counter(slot.get("TIME_SLOT_ID") for slot in root.iterfind("TIME_ORDER/TIME_SLOT"))
+    identifiers.update(annotation.get("ANNOTATION_ID") for annotation in root.iterfind("TIER/ANNOTATION/*"))
     for name, count in identifiers.items():
         if name is None:
             yield "an annotation or time slot has no identifier"
@@ -158,11 +143,7 @@ def _dangling_names(root: etree._Element) -> Iterator[str]:
             yield f"the tier {name} depends on the tier {parent}, which is not there"
     parents = {tier.get("TIER_ID"): tier.get("PARENT_REF") for tier in root.iterfind("TIER")}
     for name in parents:
-        seen, above = {name}, parents[name]
-        while above is not None and above not in seen:
-            seen.add(above)
-            above = parents.get(above)
-        if above == name:
+        if _in_a_ring(name, parents):
             yield f"the tier {name} depends on itself"
     for kind in root.iterfind("LINGUISTIC_TYPE"):
         vocabulary = kind.get("CONTROLLED_VOCABULARY_REF")
@@ -175,12 +156,8 @@ def _dangling_names(root: etree._Element) -> Iterator[str]:
 
 def _annotations(root: etree._Element, media_ms: float | None) -> Iterator[str]:
     slots = {slot.get("TIME_SLOT_ID"): slot.get("TIME_VALUE") for slot in root.iterfind("TIME_ORDER/TIME_SLOT")}
-    parents: dict[str | None, str | None] = {}
-    known = set()
-    for annotation in root.iterfind("TIER/ANNOTATION/*"):
-        known.add(annotation.get("ANNOTATION_ID"))
-        if annotation.tag == "REF_ANNOTATION":
-            parents[annotation.get("ANNOTATION_ID")] = annotation.get("ANNOTATION_REF")
+    parents = parent_annotations(root)
+    known = {annotation.get("ANNOTATION_ID") for annotation in root.iterfind("TIER/ANNOTATION/*")}
     for tier in root.iterfind("TIER"):
         name = tier.get("TIER_ID")
         if any(len(annotation) == 0 for annotation in tier.iterfind("ANNOTATION")):
@@ -217,12 +194,9 @@ def _annotations(root: etree._Element, media_ms: float | None) -> Iterator[str]:
 
 
 def _in_a_ring(identifier: str | None, parents: dict[str | None, str | None]) -> bool:
-    """Whether following the parents of an annotation leads back to it."""
-    seen = set()
-    current = parents.get(identifier)
-    while current in parents and current not in seen:
-        if current == identifier:
-            return True
-        seen.add(current)
-        current = parents[current]
-    return current == identifier
+    """Whether following the parents of an annotation, or a tier, leads back to it."""
+    seen, above = {identifier}, parents.get(identifier)
+    while above is not None and above not in seen:
+        seen.add(above)
+        above = parents.get(above)
+    return above is not None and above == identifier

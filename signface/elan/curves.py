@@ -112,10 +112,7 @@ def write_tsconf(
     SignfaceError
         The curves cannot be read, or the folder cannot be written.
     """
-    try:
-        table = pd.read_csv(curves)
-    except (OSError, ValueError) as error:
-        raise SignfaceError("cannot be read as a file of curves", file=curves) from error
+    table = _read_curves(curves)
     root = etree.Element("timeseries", date=iso_date(date), version="1.0")
     source = etree.SubElement(root, "tracksource")
     source.set("source-url", link_urls(curves, path)[0])
@@ -132,7 +129,7 @@ def write_tsconf(
         etree.SubElement(track, "description").text = curve.description
         etree.SubElement(track, "units").text = curve.units
         etree.SubElement(track, "range", min=f"{low:g}", max=f"{high:g}")
-        etree.SubElement(track, "color").text = ",".join(str(part) for part in curve.colour)
+        etree.SubElement(track, "color").text = ",".join(map(str, curve.colour))
     write_document(etree.ElementTree(root), path)
 
 
@@ -144,14 +141,17 @@ def panels(curves: str | PathLike[str]) -> dict[int, list[str]]:
     SignfaceError
         The curves cannot be read.
     """
-    try:
-        names = pd.read_csv(curves, nrows=0).columns[1:]
-    except (OSError, ValueError) as error:
-        raise SignfaceError("cannot be read as a file of curves", file=curves) from error
     drawn: dict[int, list[str]] = {}
-    for column, name in enumerate(names, start=1):
+    for column, name in enumerate(_read_curves(curves, nrows=0).columns[1:], start=1):
         drawn.setdefault((CURVES.get(name) or _other_curve(name, column)).panel, []).append(name)
     return dict(sorted(drawn.items()))
+
+
+def _read_curves(curves: str | PathLike[str], nrows: int | None = None) -> pd.DataFrame:
+    try:
+        return pd.read_csv(curves, nrows=nrows)
+    except (OSError, ValueError) as error:
+        raise SignfaceError("cannot be read as a file of curves", file=curves) from error
 
 
 def _other_curve(name: str, column: int) -> Curve:

@@ -1,5 +1,6 @@
 """EAF as XML: safe reading, whole writing, links to media, and the record of what signface wrote.
 
+- `named`: an element by its name.
 - `read_document`: the tree of an EAF 2.5 to 3.0, or one clear error; `parse_xml`: of any of ELAN's files.
 - `write_document`: indented UTF-8, whole or not at all.
 - `link_urls`: absolute and relative URL of a linked file, as ELAN resolves them.
@@ -14,13 +15,14 @@ import os
 import re
 import shutil
 from collections.abc import Callable
+from itertools import takewhile
 from os import PathLike
 from pathlib import Path, PurePath, PureWindowsPath
 
 from lxml import etree
 
 from signface.errors import SignfaceError
-from signface.files import whole_file
+from signface.files import reading, whole_file
 
 XSI = "http://www.w3.org/2001/XMLSchema-instance"
 SCHEMA_URL = "http://www.mpi.nl/tools/elan/EAFv3.0.xsd"
@@ -30,8 +32,25 @@ PROPERTY_PREFIX = "signface:"
 WRITTEN_PREFIX = f"{PROPERTY_PREFIX}written:"
 CHANNEL_PREFIX = f"{PROPERTY_PREFIX}channel:"
 
+#: Attribute that identifies an element, for those whose identifiers must be unique among their like.
+NAMES = {
+    "TIER": "TIER_ID",
+    "LINGUISTIC_TYPE": "LINGUISTIC_TYPE_ID",
+    "CONTROLLED_VOCABULARY": "CV_ID",
+    "LANGUAGE": "LANG_ID",
+    "EXTERNAL_REF": "EXT_REF_ID",
+    "LEXICON_REF": "LEX_REF_ID",
+    "LOCALE": "LANGUAGE_CODE",
+    "CONSTRAINT": "STEREOTYPE",
+}
+
 #: Start and end in milliseconds (None where the file leaves them open) and value of an annotation.
 Row = tuple[int | None, int | None, str]
+
+
+def named(root: etree._Element, tag: str, name: str | None) -> etree._Element | None:
+    """The first element of a tag (one of `NAMES`) that has this name."""
+    return next((element for element in root.iterfind(tag) if element.get(NAMES[tag]) == name), None)
 
 
 def read_document(path: str | PathLike[str]) -> etree._ElementTree:
@@ -74,12 +93,8 @@ def parse_xml(path: str | PathLike[str]) -> etree._ElementTree:
     # Entities are refused, not resolved: an EAF has no use for them, and a nested one can fill the memory.
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=True)
     try:
-        with file.open("rb") as stream:
+        with reading(file), file.open("rb") as stream:
             tree = etree.parse(stream, parser)
-    except FileNotFoundError as error:
-        raise SignfaceError("no such file", file=file) from error
-    except OSError as error:
-        raise SignfaceError(f"cannot be read ({error.strerror or 'input error'})", file=file) from error
     except etree.XMLSyntaxError as error:
         if "entity amplification" in (error.msg or ""):
             raise SignfaceError("holds XML entities that swell without end", file=file) from error
@@ -159,13 +174,8 @@ def link_urls(file: str | PathLike[str], beside: str | PathLike[str]) -> tuple[s
 def _relative(target: PurePath, folder: PurePath) -> str | None:
     if target.anchor != folder.anchor:
         return None
-    common = 0
-    for a, b in zip(target.parts, folder.parts):
-        if a != b:
-            break
-        common += 1
-    up = len(folder.parts) - common
-    steps = [".."] * up if up else ["."]
+    common = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(target.parts, folder.parts)))
+    steps = [".."] * (len(folder.parts) - common) or ["."]
     return _escape("/".join([*steps, *target.parts[common:]]))
 
 
@@ -194,21 +204,20 @@ def iso_date(date: datetime.datetime | str | None) -> str:
 
 def set_property(root: etree._Element, name: str, value: str) -> None:
     """Set a header property, keeping the place of one that is there."""
-    header = root.find("HEADER")
-    for element in header.findall("PROPERTY"):
-        if element.get("NAME") == name:
-            element.text = value
-            return
-    element = etree.SubElement(header, "PROPERTY", NAME=name)
+    element = _property(root, name)
+    if element is None:
+        element = etree.SubElement(root.find("HEADER"), "PROPERTY", NAME=name)
     element.text = value
 
 
 def get_property(root: etree._Element, name: str) -> str | None:
     """Text of a header property, or None."""
-    for element in root.findall("HEADER/PROPERTY"):
-        if element.get("NAME") == name:
-            return element.text or ""
-    return None
+    element = _property(root, name)
+    return None if element is None else element.text or ""
+
+
+def _property(root: etree._Element, name: str) -> etree._Element | None:
+    return next((element for element in root.iterfind("HEADER/PROPERTY") if element.get("NAME") == name), None)
 
 
 def fresh_ids(root: etree._Element) -> Callable[[str], str]:
@@ -218,7 +227,7 @@ def fresh_ids(root: etree._Element) -> Callable[[str], str]:
         for element in root.iter("TIME_SLOT", "ALIGNABLE_ANNOTATION", "REF_ANNOTATION", *OTHER_IDENTIFIERS)
         for attribute in ("TIME_SLOT_ID", "ANNOTATION_ID", *OTHER_IDENTIFIERS.values())
     }
-    last = {"a": _last_number(root, "a"), "ts": 0}
+    last = {"a": _last_number(root), "ts": 0}
     for identifier in used:
         match = re.fullmatch(r"(a|ts)(\d+)", identifier or "")
         if match:
@@ -246,10 +255,10 @@ OTHER_IDENTIFIERS = {
 }
 
 
-def _last_number(root: etree._Element, prefix: str) -> int:
+def _last_number(root: etree._Element) -> int:
     """The number that ELAN remembers as last used, so that identifiers of deleted annotations do not come back."""
     remembered = (get_property(root, "lastUsedAnnotationId") or "").strip()
-    return int(remembered) if prefix == "a" and remembered.isdigit() else 0
+    return int(remembered) if remembered.isdigit() else 0
 
 
 def last_annotation_number(root: etree._Element) -> int:
@@ -259,7 +268,7 @@ def last_annotation_number(root: etree._Element) -> int:
         for annotation in root.iterfind("TIER/ANNOTATION/*")
         if (match := re.fullmatch(r"a(\d+)", annotation.get("ANNOTATION_ID") or ""))
     ]
-    return max([*numbers, _last_number(root, "a")])
+    return max([*numbers, _last_number(root)])
 
 
 def written_record(rows: list[Row]) -> str:
@@ -285,6 +294,12 @@ def recorded(root: etree._Element) -> dict[str, list[Row]]:
     return records
 
 
+def parent_annotations(root: etree._Element) -> dict[str | None, str | None]:
+    """The annotation that each dependent one hangs on, by their identifiers."""
+    dependents = root.iterfind("TIER/ANNOTATION/REF_ANNOTATION")
+    return {annotation.get("ANNOTATION_ID"): annotation.get("ANNOTATION_REF") for annotation in dependents}
+
+
 def tier_rows(root: etree._Element) -> dict[str, list[Row]]:
     """Every tier's annotations as (start, end, value), milliseconds, in the order of time.
 
@@ -296,15 +311,14 @@ def tier_rows(root: etree._Element) -> dict[str, list[Row]]:
         for slot in root.iterfind("TIME_ORDER/TIME_SLOT")
         if slot.get("TIME_VALUE") is not None
     }
-    spans: dict[str | None, tuple[int | None, int | None]] = {}
-    parents: dict[str | None, str | None] = {}
-    for annotation in root.iterfind("TIER/ANNOTATION/ALIGNABLE_ANNOTATION"):
-        spans[annotation.get("ANNOTATION_ID")] = (
+    spans: dict[str | None, tuple[int | None, int | None]] = {
+        annotation.get("ANNOTATION_ID"): (
             times.get(annotation.get("TIME_SLOT_REF1")),
             times.get(annotation.get("TIME_SLOT_REF2")),
         )
-    for annotation in root.iterfind("TIER/ANNOTATION/REF_ANNOTATION"):
-        parents[annotation.get("ANNOTATION_ID")] = annotation.get("ANNOTATION_REF")
+        for annotation in root.iterfind("TIER/ANNOTATION/ALIGNABLE_ANNOTATION")
+    }
+    parents = parent_annotations(root)
 
     def span(identifier: str | None) -> tuple[int | None, int | None]:
         seen = set()

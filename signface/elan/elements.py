@@ -20,11 +20,7 @@ from signface.elan.document import link_urls
 from signface.elan.tiers import clean_name
 from signface.label.vocabulary import Vocabulary
 
-LANGUAGE = {
-    "LANG_ID": "eng",
-    "LANG_DEF": "http://cdb.iso.org/lg/CDB-00138502-001",
-    "LANG_LABEL": "English (eng)",
-}
+LANGUAGE = {"LANG_ID": "eng", "LANG_DEF": "http://cdb.iso.org/lg/CDB-00138502-001", "LANG_LABEL": "English (eng)"}
 #: The four stereotypes, in ELAN's own words and spelling.
 CONSTRAINTS = {
     "Time_Subdivision": "Time subdivision of parent annotation's time interval, "
@@ -100,17 +96,9 @@ def aligned_annotations(
     slots: TimeSlots,
     fresh_id: Callable[[str], str],
 ) -> list[str | None]:
-    """Fill a tier with time-aligned annotations; None among the values leaves one out.
+    """Fill a tier with time-aligned annotations, and give their identifiers; None among the values leaves one out.
 
-    Parameters
-    ----------
-    entries : mapping
-        Value and entry id (`CVE_ID`) of the tier's vocabulary.
-
-    Returns
-    -------
-    list of str or None
-        The identifier of each annotation.
+    `entries` has the entry id (`CVE_ID`) of each value of the tier's vocabulary.
     """
     identifiers: list[str | None] = []
     for start, end, value in zip(start_ms, end_ms, values):

@@ -30,9 +30,10 @@ from lxml import etree
 
 from signface.channels.events import ChannelEvents
 from signface.elan.channels import vocabulary_of
-from signface.elan.document import read_document
+from signface.elan.document import named, read_document
+from signface.elan.vocabularies import vocabulary_entries, vocabulary_name
 from signface.errors import SignfaceError
-from signface.files import whole_file
+from signface.files import reading, whole_file
 from signface.label.vocabulary import AFFECT, INTENSITY, Vocabulary
 
 
@@ -76,11 +77,8 @@ def read_mapping(path: str | PathLike[str]) -> dict[str, ChannelRule]:
     """
     file = Path(path)
     try:
-        content = tomllib.loads(file.read_text("utf-8"))
-    except FileNotFoundError as error:
-        raise SignfaceError("no such file", file=file) from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise SignfaceError("cannot be read as text", file=file) from error
+        with reading(file):
+            content = tomllib.loads(file.read_text("utf-8"))
     except tomllib.TOMLDecodeError as error:
         raise SignfaceError(f"is no TOML ({error})", file=file) from error
     rules = {}
@@ -202,11 +200,9 @@ def write_mapping(
 
     Examples
     --------
-    >>> from pathlib import Path
-    >>> from tempfile import mkdtemp
-    >>> from signface.files import bundled_corpus
-    >>> file = write_mapping(bundled_corpus() / "reference" / "M1_IE_J.eaf", Path(mkdtemp()) / "mapping.toml")
-    >>> read_mapping(file)["affect"].tier
+    >>> import signface as sf
+    >>> template = sf.datasets.mini_file().with_name("reference") / "M1_IE_J.eaf"
+    >>> read_mapping(write_mapping(template, "mapping.toml"))["affect"].tier
     'affect@{signer}'
     """
     file = Path(path)
@@ -252,10 +248,8 @@ def _closest_value(label: str, description: str, values: dict[str, list[str]]) -
 
 def stereotype(root: etree._Element, tier: etree._Element) -> str | None:
     """How a tier depends on its parent (`Symbolic_Association`, ...); None for an independent tier."""
-    for kind in root.iterfind("LINGUISTIC_TYPE"):
-        if kind.get("LINGUISTIC_TYPE_ID") == tier.get("LINGUISTIC_TYPE_REF"):
-            return kind.get("CONSTRAINTS")
-    return None
+    kind = named(root, "LINGUISTIC_TYPE", tier.get("LINGUISTIC_TYPE_REF"))
+    return None if kind is None else kind.get("CONSTRAINTS")
 
 
 def _names_of_values(root: etree._Element, tier: etree._Element) -> dict[str, list[str]] | None:
@@ -280,26 +274,13 @@ def closed_entries(root: etree._Element, tier: etree._Element) -> dict[str, str]
 
     None where the tier has no vocabulary, or an external one, whose entries are not in the file.
     """
-    name = next(
-        (
-            kind.get("CONTROLLED_VOCABULARY_REF")
-            for kind in root.iterfind("LINGUISTIC_TYPE")
-            if kind.get("LINGUISTIC_TYPE_ID") == tier.get("LINGUISTIC_TYPE_REF")
-        ),
-        None,
-    )
-    vocabulary = next((cv for cv in root.iterfind("CONTROLLED_VOCABULARY") if cv.get("CV_ID") == name), None)
-    if name is None or vocabulary is None or vocabulary.get("EXT_REF"):
+    name = vocabulary_name(root, tier)
+    vocabulary = None if name is None else named(root, "CONTROLLED_VOCABULARY", name)
+    if vocabulary is None or vocabulary.get("EXT_REF"):
         return None
-    language = tier.get("LANG_REF")
     entries: dict[str, str] = {}
-    for entry in vocabulary.iterfind("CV_ENTRY_ML"):
-        values = entry.findall("CVE_VALUE")
-        chosen = next((value for value in values if value.get("LANG_REF") == language), values[0] if values else None)
-        if chosen is not None:
-            entries.setdefault(chosen.text or "", entry.get("CVE_ID") or "")
-    for entry in vocabulary.iterfind("CV_ENTRY"):  # EAF 2.7 and before
-        entries.setdefault(entry.text or "", "")
+    for value, _, identifier in vocabulary_entries(vocabulary, tier.get("LANG_REF")):
+        entries.setdefault(value, identifier)
     return entries
 
 

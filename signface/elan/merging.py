@@ -18,6 +18,7 @@ from signface.elan.document import (
     Row,
     fresh_ids,
     last_annotation_number,
+    named,
     recorded,
     set_property,
     tier_rows,
@@ -88,11 +89,7 @@ def put_tiers(
     """
     before = tier_rows(root)
     written = recorded(root)
-    groups: list[tuple[Tier, list[_Target]]] = []
-    for tier in tiers:
-        targets = _plan(root, tier, mapping or {}, file)
-        if targets:
-            groups.append((tier, targets))
+    groups = [(tier, targets) for tier in tiers if (targets := _plan(root, tier, mapping or {}, file))]
     names = [target.tier_id for _, group in groups for target in group]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
@@ -122,8 +119,7 @@ def put_tiers(
                 _empty(root, target.element)
     for tier, group in changed:
         _write(root, tier, group, slots, fresh_id)
-    order = root.find("TIME_ORDER")
-    slots.place(order)
+    slots.place(root.find("TIME_ORDER"))
     set_property(root, "lastUsedAnnotationId", str(last_annotation_number(root)))
     after = tier_rows(root)
     for _, group in changed:
@@ -140,12 +136,11 @@ def _plan(root: etree._Element, tier: Tier, mapping: Mapping, file: Path) -> lis
     parent = _target(root, tier.channel, tier, tier.values, tier.vocabulary, None, mapping, file)
     if parent is None:
         return []
-    group = [parent]
-    for child in tier.dependents:
-        target = _target(root, child.channel, tier, child.values, child.vocabulary, parent, mapping, file)
-        if target is not None:
-            group.append(target)
-    return group
+    dependents = (
+        _target(root, child.channel, tier, child.values, child.vocabulary, parent, mapping, file)
+        for child in tier.dependents
+    )
+    return [parent, *(target for target in dependents if target is not None)]
 
 
 def _target(
@@ -162,7 +157,7 @@ def _target(
     if not rule.tier:
         return None
     tier_id = rule.tier.replace("{signer}", clean_name(tier.signer))
-    element = next((other for other in root.iterfind("TIER") if other.get("TIER_ID") == tier_id), None)
+    element = named(root, "TIER", tier_id)
     if element is None and channel in mapping:
         names = ", ".join(other.get("TIER_ID") or "" for other in root.iterfind("TIER"))
         raise SignfaceError(
@@ -293,14 +288,15 @@ def _write(
 def _type(root: etree._Element, target: _Target) -> str:
     """Name of a linguistic type for a tier of ours; it and its vocabulary are added unless the like is there."""
     wanted = type_element(target.channel, _vocabulary(root, target), dependent=not target.aligned)
-    existing = {kind.get("LINGUISTIC_TYPE_ID"): kind for kind in root.iterfind("LINGUISTIC_TYPE")}
     for name in (target.channel, f"{target.channel} (signface)"):
-        kind = existing.get(name)
+        kind = named(root, "LINGUISTIC_TYPE", name)
         if kind is None:
             wanted.set("LINGUISTIC_TYPE_ID", name)
             insert_in_order(root, wanted)
-            if not target.aligned:
-                _constraint(root, "Symbolic_Association")
+            constraint = "Symbolic_Association"
+            if not target.aligned and named(root, "CONSTRAINT", constraint) is None:
+                description = CONSTRAINTS[constraint]
+                insert_in_order(root, etree.Element("CONSTRAINT", STEREOTYPE=constraint, DESCRIPTION=description))
             return name
         if all(kind.get(key) == wanted.get(key) for key in ("CONSTRAINTS", "CONTROLLED_VOCABULARY_REF")):
             return name
@@ -312,12 +308,10 @@ def _vocabulary(root: etree._Element, target: _Target) -> str | None:
     vocabulary = target.vocabulary
     if vocabulary is None:
         return None
-    existing = {cv.get("CV_ID"): cv for cv in root.iterfind("CONTROLLED_VOCABULARY")}
     for name in (vocabulary.name, f"{vocabulary.name} (signface)"):
-        element = existing.get(name)
+        element = named(root, "CONTROLLED_VOCABULARY", name)
         if element is None:
-            language = next((e for e in root.iterfind("LANGUAGE") if e.get("LANG_ID") == LANGUAGE["LANG_ID"]), None)
-            if language is None:
+            if named(root, "LANGUAGE", LANGUAGE["LANG_ID"]) is None:
                 insert_in_order(root, etree.Element("LANGUAGE", LANGUAGE))
             insert_in_order(root, vocabulary_element(vocabulary, name))
             return name
@@ -325,8 +319,3 @@ def _vocabulary(root: etree._Element, target: _Target) -> str | None:
         if entries >= {entry_identifier(value) for value in vocabulary.allowed}:
             return name
     raise SignfaceError(f"has vocabularies named {vocabulary.name} of another kind", hint="rename them in ELAN")
-
-
-def _constraint(root: etree._Element, name: str) -> None:
-    if not any(constraint.get("STEREOTYPE") == name for constraint in root.iterfind("CONSTRAINT")):
-        insert_in_order(root, etree.Element("CONSTRAINT", STEREOTYPE=name, DESCRIPTION=CONSTRAINTS[name]))

@@ -58,7 +58,7 @@ def write_preferences(
                 )
                 colour = etree.SubElement(preference, "Object")
                 colour.set("class", "java.awt.Color")
-                colour.text = ",".join(str(part) for part in entry.colour or ())
+                colour.text = ",".join(map(str, entry.colour or ()))
     if curves is not None:
         drawn = panels(curves)
         count = etree.SubElement(root, "pref", key="TimeSeriesViewer.NumberOfPanels")

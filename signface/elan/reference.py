@@ -27,11 +27,7 @@ from signface.segmentation.segments import Segments
 
 
 def read_reference(
-    eaf: str | PathLike[str],
-    signer: str | None = None,
-    *,
-    tier: str = "affect",
-    vocabulary: Vocabulary | None = None,
+    eaf: str | PathLike[str], signer: str | None = None, *, tier: str = "affect", vocabulary: Vocabulary | None = None
 ) -> Segments:
     """Read the reference annotation of one signer.
 
@@ -165,14 +161,9 @@ def read_tiers(eaf: str | PathLike[str]) -> dict[str, pd.DataFrame]:
 
 
 def read_annotators(files: Sequence[str | PathLike[str]]) -> dict[str, dict[str, pd.DataFrame]]:
-    """The tiers (`read_tiers`) of several annotators' files of one take.
+    """The tiers of several annotators' files of one take; errors are those of `read_tiers`.
 
     Each stands under the stem of its file, or under its path where two stems are equal.
-
-    Raises
-    ------
-    SignfaceError
-        As `read_tiers`.
     """
     stems = [Path(file).stem for file in files]
     names = stems if len(set(stems)) == len(stems) else [str(file) for file in files]
@@ -184,12 +175,8 @@ def read_corrections(
 ) -> tuple[pd.DataFrame, pd.DataFrame] | None:
     """A tier as signface wrote it and as it is now: two tables `start_s, end_s, label`.
 
-    None when signface did not write the tier, so that nothing can be said of corrections.
-
-    Raises
-    ------
-    SignfaceError
-        As `read_reference`.
+    None when signface did not write the tier, so that nothing can be said of corrections. Parameters and errors are
+    those of `read_reference`.
     """
     file = Path(eaf)
     root = read_document(file).getroot()
@@ -319,16 +306,11 @@ def _fill_times(root: etree._Element) -> None:
             slots[i].set("TIME_VALUE", str(start + (end - start) * (i - before) // (after - before)))
 
 
-def _intensities(
-    rows: list[tuple[int, int, str]], annotated: list[Row], name: str, file: Path
-) -> list[int | None] | pd.Series:
+def _intensities(rows: list[tuple[int, int, str]], annotated: list[Row], name: str, file: Path) -> pd.Series:
     """Intensity of each segment: that of the annotation with its times (1, 2, 3), missing where there is none."""
-    by_time = {}
-    for start, end, value in annotated:
-        text = value.strip()
-        if not text:
-            continue
-        if text not in INTENSITY.values:
-            raise SignfaceError(f"intensity {text!r} on tier {name} is not 1, 2 or 3", file=file)
-        by_time[(start, end)] = int(text)
-    return pd.Series([by_time.get((start, end)) for start, end, _ in rows], dtype="Int64")
+    by_time = {(start, end): value.strip() for start, end, value in annotated if value.strip()}
+    for value in by_time.values():
+        if value not in INTENSITY.values:
+            raise SignfaceError(f"intensity {value!r} on tier {name} is not 1, 2 or 3", file=file)
+    levels = (by_time.get((start, end)) for start, end, _ in rows)
+    return pd.Series([None if level is None else int(level) for level in levels], dtype="Int64")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from lxml import etree
 
-from signface.elan.document import SCHEMA_URL, XSI
+from signface.elan.document import SCHEMA_URL, XSI, named
 
 #: The language of values that were written before languages were known, as ELAN names it.
 UNDETERMINED = {
@@ -56,9 +56,8 @@ def upgrade(root: etree._Element) -> None:
 def _upgrade_vocabulary(root: etree._Element, vocabulary: etree._Element) -> None:
     description = vocabulary.attrib.pop("DESCRIPTION", None)
     if description:
-        element = etree.Element("DESCRIPTION", LANG_REF=_undetermined(root))
-        element.text = description
-        vocabulary.insert(0, element)
+        vocabulary.insert(0, etree.Element("DESCRIPTION", LANG_REF=_undetermined(root)))
+        vocabulary[0].text = description
     used = {entry.get("CVE_ID") for entry in vocabulary.iterfind("CV_ENTRY_ML")}
     number = 0
     for entry in vocabulary.findall("CV_ENTRY"):
@@ -78,6 +77,6 @@ def _upgrade_vocabulary(root: etree._Element, vocabulary: etree._Element) -> Non
 
 def _undetermined(root: etree._Element) -> str:
     """Identifier of the undetermined language, which is added to the document when it is not there."""
-    if not any(language.get("LANG_ID") == UNDETERMINED["LANG_ID"] for language in root.iterfind("LANGUAGE")):
+    if named(root, "LANGUAGE", UNDETERMINED["LANG_ID"]) is None:
         insert_in_order(root, etree.Element("LANGUAGE", UNDETERMINED))
     return UNDETERMINED["LANG_ID"]

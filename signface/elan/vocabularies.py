@@ -13,9 +13,9 @@ from pathlib import Path
 
 from lxml import etree
 
-from signface.elan.document import parse_xml, read_document
+from signface.elan.document import named, parse_xml, read_document
 from signface.errors import SignfaceError
-from signface.files import whole_file
+from signface.files import reading, whole_file
 from signface.label.vocabulary import Colour, Entry, Vocabulary
 
 #: Endings of what is read as XML; anything else is text.
@@ -48,9 +48,7 @@ def read_vocabulary(path: str | PathLike[str], *, tier: str | None = None, name:
 
     Examples
     --------
-    >>> from pathlib import Path
-    >>> from tempfile import mkdtemp
-    >>> file = Path(mkdtemp()) / "brows.txt"
+    >>> file = Path("brows.txt")
     >>> _ = file.write_text("raised\\teyebrows raised\\nlowered\\n")
     >>> read_vocabulary(file).values
     ('raised', 'lowered')
@@ -64,8 +62,7 @@ def read_vocabulary(path: str | PathLike[str], *, tier: str | None = None, name:
         else:
             root = read_document(file).getroot()
         element = _chosen(root, tier, name, file)
-        language = next((t.get("LANG_REF") for t in root.iterfind("TIER") if t.get("TIER_ID") == tier), None)
-        return _from_element(element, language, file)
+        return _from_element(element, _language(root, tier), file)
     except SignfaceError as error:
         raise error.at(file) from error
 
@@ -93,21 +90,20 @@ def write_vocabulary(vocabulary: Vocabulary, path: str | PathLike[str]) -> None:
 
 def vocabulary_of_tier(root: etree._Element, tier: str, file: Path) -> Vocabulary | None:
     """The closed vocabulary of a tier of an EAF; None where it has none, or one that is kept elsewhere."""
-    wanted = _name_of(root, tier)
-    for element in root.iterfind("CONTROLLED_VOCABULARY"):
-        if element.get("CV_ID") == wanted and len(list(_values(element, None))):
-            language = next((t.get("LANG_REF") for t in root.iterfind("TIER") if t.get("TIER_ID") == tier), None)
-            return _from_element(element, language, file)
-    return None
+    element = named(root, "CONTROLLED_VOCABULARY", vocabulary_name(root, named(root, "TIER", tier)))
+    if element is None or not any(vocabulary_entries(element, None)):
+        return None
+    return _from_element(element, _language(root, tier), file)
+
+
+def _language(root: etree._Element, tier: str | None) -> str | None:
+    element = named(root, "TIER", tier)
+    return None if element is None else element.get("LANG_REF")
 
 
 def _from_text(file: Path) -> Vocabulary:
-    try:
+    with reading(file):
         lines = file.read_text("utf-8-sig").splitlines()
-    except FileNotFoundError as error:
-        raise SignfaceError("no such file", file=file) from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise SignfaceError("cannot be read as text", file=file) from error
     entries, comments = [], []
     for number, line in enumerate(lines, start=1):
         if not line.strip():
@@ -139,7 +135,7 @@ def _chosen(root: etree._Element, tier: str | None, name: str | None, file: Path
         tiers = [element.get("TIER_ID") or "" for element in root.iterfind("TIER")]
         if tier not in tiers:
             raise SignfaceError(f"has no tier {tier}", file=file, hint=f"its tiers are {', '.join(tiers) or 'none'}")
-        name = _name_of(root, tier)
+        name = vocabulary_name(root, named(root, "TIER", tier))
         if name is None:
             raise SignfaceError(f"its tier {tier} has no closed vocabulary", file=file, hint=there)
     if name is None and len(elements) != 1:
@@ -150,22 +146,21 @@ def _chosen(root: etree._Element, tier: str | None, name: str | None, file: Path
     return element
 
 
-def _name_of(root: etree._Element, tier: str) -> str | None:
+def vocabulary_name(root: etree._Element, tier: etree._Element | None) -> str | None:
     """Name of the vocabulary of a tier's linguistic type."""
-    kind = next((t.get("LINGUISTIC_TYPE_REF") for t in root.iterfind("TIER") if t.get("TIER_ID") == tier), None)
-    types = {element.get("LINGUISTIC_TYPE_ID"): element for element in root.iterfind("LINGUISTIC_TYPE")}
-    return types[kind].get("CONTROLLED_VOCABULARY_REF") if kind in types else None
+    kind = None if tier is None else named(root, "LINGUISTIC_TYPE", tier.get("LINGUISTIC_TYPE_REF"))
+    return None if kind is None else kind.get("CONTROLLED_VOCABULARY_REF")
 
 
-def _values(element: etree._Element, language: str | None) -> Iterator[tuple[str, str, str]]:
-    """Value, description and identifier of each entry, in a language where the entry has it."""
+def vocabulary_entries(element: etree._Element, language: str | None) -> Iterator[tuple[str, str, str]]:
+    """Value, description and identifier (`CVE_ID`) of each entry, in a language where the entry has it."""
     for entry in element.iterfind("CV_ENTRY_ML"):
         values = entry.findall("CVE_VALUE")
         chosen = next((value for value in values if value.get("LANG_REF") == language), values[0] if values else None)
         if chosen is not None:
-            yield (chosen.text or "").strip(), chosen.get("DESCRIPTION") or "", entry.get("CVE_ID") or ""
+            yield chosen.text or "", chosen.get("DESCRIPTION") or "", entry.get("CVE_ID") or ""
     for entry in element.iterfind("CV_ENTRY"):  # EAF 2.7 and before
-        yield (entry.text or "").strip(), entry.get("DESCRIPTION") or "", ""
+        yield entry.text or "", entry.get("DESCRIPTION") or "", ""
 
 
 def _from_element(element: etree._Element, language: str | None, file: Path) -> Vocabulary:
@@ -173,7 +168,7 @@ def _from_element(element: etree._Element, language: str | None, file: Path) -> 
     if element.get("EXT_REF"):
         raise SignfaceError(f"the vocabulary {name} is kept in another file", file=file, hint="read its .ecv")
     colours = _colours(file.with_suffix(".pfsx"), name)
-    rows = {value: (description, key) for value, description, key in _values(element, language) if value}
+    rows = {value.strip(): rest for value, *rest in vocabulary_entries(element, language) if value.strip()}
     if not rows:
         raise SignfaceError(f"the vocabulary {name} has no value", file=file)
     described = element.find("DESCRIPTION")
@@ -184,8 +179,6 @@ def _from_element(element: etree._Element, language: str | None, file: Path) -> 
 
 def _colours(preferences: Path, name: str) -> dict[str, Colour]:
     """Colour of each entry of a vocabulary in the preferences beside an EAF; none where they cannot be read."""
-    if not preferences.is_file():
-        return {}
     try:
         root = parse_xml(preferences).getroot()
     except SignfaceError:  # an annotator's preferences are not what was asked for
@@ -194,8 +187,8 @@ def _colours(preferences: Path, name: str) -> dict[str, Colour]:
     colours: dict[str, Colour] = {}
     for group in groups:
         for entry in group.iterfind("prefGroup") if group.get("key") == name else ():
-            parts = re.fullmatch(r"(\d{1,3}),(\d{1,3}),(\d{1,3})", (entry.findtext("pref/Object") or "").strip())
-            if parts is not None and all(int(part) < 256 for part in parts.groups()):
-                red, green, blue = map(int, parts.groups())
+            match = re.fullmatch(r"(\d{1,3}),(\d{1,3}),(\d{1,3})", (entry.findtext("pref/Object") or "").strip())
+            if match is not None and all(int(share) < 256 for share in match.groups()):
+                red, green, blue = map(int, match.groups())
                 colours[entry.get("key") or ""] = (red, green, blue)
     return colours

@@ -61,42 +61,33 @@ TSCONF = "_tsconf.xml"
 
 
 class Results(Protocol):
-    """What can be written: `signface.annotation.Annotation`, or anything that holds the like."""
+    """What can be written: `signface.annotation.Annotation`, or anything that holds the like.
+
+    `segments` are labelled, with confidence, and with `intensity` where it is known; `channels` are events by channel;
+    `curves` is `time_s` and curves (`signface.segmentation.curves.curves_table`); `signer` names the tiers; `tier` says
+    what the segments are of, `vocabulary` what their labels are, and `facts` what the header of the file says.
+    """
 
     @property
-    def segments(self) -> Segments:
-        """Labelled, with confidence; with `intensity` where it is known."""
-        ...
+    def segments(self) -> Segments: ...
 
     @property
-    def channels(self) -> MappingABC[str, ChannelEvents] | None:
-        """Events by channel."""
-        ...
+    def channels(self) -> MappingABC[str, ChannelEvents] | None: ...
 
     @property
-    def curves(self) -> pd.DataFrame:
-        """`time_s` and curves (`signface.segmentation.curves.curves_table`)."""
-        ...
+    def curves(self) -> pd.DataFrame: ...
 
     @property
-    def signer(self) -> Signer:
-        """Names the tiers."""
-        ...
+    def signer(self) -> Signer: ...
 
     @property
-    def tier(self) -> str:
-        """What the segments are of."""
-        ...
+    def tier(self) -> str: ...
 
     @property
-    def vocabulary(self) -> Vocabulary:
-        """Of their labels."""
-        ...
+    def vocabulary(self) -> Vocabulary: ...
 
     @property
-    def facts(self) -> MappingABC[str, str]:
-        """What the header of the file says of the results."""
-        ...
+    def facts(self) -> MappingABC[str, str]: ...
 
 
 def write_eaf(
@@ -172,13 +163,8 @@ def write_eaf(
 
     Examples
     --------
-    >>> from pathlib import Path
-    >>> from tempfile import mkdtemp
-    >>> import pandas as pd
-    >>> from signface.segmentation.segments import Segments
-    >>> rows = [(0.0, 1.2, "stable", "N"), (1.2, 1.5, "transition", "NJ"), (1.5, 2.4, "stable", "J")]
-    >>> segments = Segments(pd.DataFrame(rows, columns=["start_s", "end_s", "kind", "label"]), name="take")
-    >>> [file.name for file in write_eaf(segments, Path(mkdtemp()) / "take.eaf", signer="Eva")]
+    >>> import signface as sf
+    >>> [file.name for file in write_eaf(sf.datasets.mini_reference(), "take.eaf", signer="Eva")]
     ['take.eaf']
     """
     return prepare(
@@ -240,13 +226,7 @@ def prepare(
     rules = {} if options.mapping is None else read_mapping(options.mapping)
     links = () if curves is None else _curve_files(root, file)
     source = file if into is not None or options.template is None else Path(options.template)
-    changed = put_tiers(
-        root,
-        all_tiers,
-        mapping=rules,
-        replace=replace,
-        file=source,
-    )
+    changed = put_tiers(root, all_tiers, mapping=rules, replace=replace, file=source)
     if changed or into is None:
         root.set("DATE", iso_date(date))
         _fill_header(root, file, segments, video, facts, links)
@@ -262,24 +242,16 @@ def prepare(
 
 
 def to_pympi(annotation: Results | Segments, *, options: EafOptions | None = None, signer: str | None = None) -> Eaf:
-    """What `write_eaf` writes, without curves, as pympi-ling's object for scripts.
+    """What `write_eaf` writes, without curves, as pympi-ling's object for scripts; errors are those of `write_eaf`.
 
     What pympi writes again has no colours, and links between annotations are lost: files for annotators come from
     `write_eaf`.
 
-    Raises
-    ------
-    SignfaceError
-        As `write_eaf`.
-
     Examples
     --------
-    >>> import pandas as pd
-    >>> from signface.segmentation.segments import Segments
-    >>> rows = [(0.0, 1.2, "stable", "N"), (1.2, 1.5, "transition", "NJ"), (1.5, 2.4, "stable", "J")]
-    >>> segments = Segments(pd.DataFrame(rows, columns=["start_s", "end_s", "kind", "label"]), name="take")
-    >>> to_pympi(segments, signer="Eva").get_annotation_data_for_tier("affect@Eva")
-    [(0, 1200, 'N'), (1200, 1500, 'NJ'), (1500, 2400, 'J')]
+    >>> import signface as sf
+    >>> to_pympi(sf.datasets.mini_reference(), signer="Eva").get_annotation_data_for_tier("affect@Eva")[:3]
+    [(0, 2846, 'N'), (2846, 3031, 'ND'), (3031, 4641, 'D')]
     """
     from pympi.Elan import Eaf
 

@@ -63,12 +63,7 @@ class FaceReport:
     @property
     def clean(self) -> bool:
         """Whether the mesh is one connected skin without duplicates, loose vertices, flat triangles, forked edges."""
-        flaws = (
-            self.duplicate_vertices,
-            self.unreferenced_vertices,
-            self.degenerate_triangles,
-            self.nonmanifold_edges,
-        )
+        flaws = (self.duplicate_vertices, self.unreferenced_vertices, self.degenerate_triangles, self.nonmanifold_edges)
         return not any(flaws) and self.components == 1
 
 

@@ -67,10 +67,7 @@ class MarkerLayout(Content):
             raise SignfaceError(f"{self.name}: face markers without a vertex: {', '.join(loose[:5])}")
         if not np.isfinite(barycentric).all() or not np.allclose(barycentric[standing].sum(axis=1), 1.0):
             raise SignfaceError(f"{self.name}: barycentric weights must be finite and sum to 1")
-        corners.setflags(write=False)
-        barycentric.setflags(write=False)
-        for key, value in (("labels", labels), ("roles", roles), ("corners", corners), ("barycentric", barycentric)):
-            object.__setattr__(self, key, value)
+        self._hold(labels=labels, roles=roles, corners=corners, barycentric=barycentric)
 
     @classmethod
     def on_vertices(

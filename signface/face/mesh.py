@@ -41,10 +41,7 @@ class Mesh(Content):
             raise SignfaceError("the mesh has vertices that are not finite")
         if triangles.min() < 0 or triangles.max() >= len(vertices):
             raise SignfaceError("the mesh has triangles that name vertices it does not have")
-        vertices.setflags(write=False)
-        triangles.setflags(write=False)
-        object.__setattr__(self, "vertices", vertices)
-        object.__setattr__(self, "triangles", triangles)
+        self._hold(vertices=vertices, triangles=triangles)
 
     @property
     def triangle_normals(self) -> np.ndarray:

@@ -85,13 +85,8 @@ class FaceModel(Content):
             raise SignfaceError(f"{self.name}: identity shapes do not match the mesh or their names")
         if self.colours is not None and np.shape(self.colours) != (count, 3):
             raise SignfaceError(f"{self.name}: colours of shape {np.shape(self.colours)} do not match {count} vertices")
-        bases.setflags(write=False)
-        identities.setflags(write=False)
-        object.__setattr__(self, "bases", bases)
-        object.__setattr__(self, "names", names)
-        object.__setattr__(self, "identities", identities)
-        object.__setattr__(self, "identity_names", tuple(self.identity_names))
-        object.__setattr__(self, "history", tuple(self.history))
+        self._hold(bases=bases, names=names, identities=identities)
+        self._hold(identity_names=tuple(self.identity_names), history=tuple(self.history))
 
     @property
     def n_bases(self) -> int:

@@ -68,8 +68,7 @@ class Segments(Content):
         unknown = sorted(set(table["kind"]) - set(KINDS))
         if unknown:
             raise SignfaceError(f"{self.name}: unknown kind of segment: {', '.join(map(str, unknown))}")
-        object.__setattr__(self, "table", table)
-        object.__setattr__(self, "history", tuple(self.history))
+        self._hold(table=table, history=tuple(self.history))
 
     def __len__(self) -> int:
         return len(self.table)

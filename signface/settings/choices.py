@@ -15,10 +15,7 @@ FEATURES = {
 }
 
 #: name: what it is.
-NORMALISATIONS = {
-    "none": "weights as they are",
-    "signer": "weights less the signer's mean, over their spread",
-}
+NORMALISATIONS = {"none": "weights as they are", "signer": "weights less the signer's mean, over their spread"}
 
 #: How a segment gets its label. name: what it is.
 AGGREGATES = {

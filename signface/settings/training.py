@@ -55,9 +55,7 @@ class TrainingSettings(Settings):
     balanced: bool = option(False, help="let every label weigh the same in training", kind=bool)
     search: bool = option(False, help="look for the best parameters, by folds of the training takes", kind=bool)
     calibrate: bool = option(
-        True,
-        help="train on parts of the takes too, to score the rest and to calibrate confidences",
-        kind=bool,
+        True, help="train on parts of the takes too, to score the rest and to calibrate confidences", kind=bool
     )
     folds: int = option(5, help="how many parts, at most as many as there are takes or signers", kind=int)
     rate: float = option(10.0, help="frames of a second of stable segment that are trained on", kind=float)

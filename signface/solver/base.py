@@ -96,12 +96,7 @@ class MarkerBases:
     """
 
     def __init__(
-        self,
-        face: FaceModel,
-        layout: MarkerLayout,
-        *,
-        skin: bool = False,
-        signer_bases: np.ndarray | None = None,
+        self, face: FaceModel, layout: MarkerLayout, *, skin: bool = False, signer_bases: np.ndarray | None = None
     ) -> None:
         bases = layout.bases(face)
         if signer_bases is not None:

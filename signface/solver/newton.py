@@ -13,15 +13,7 @@ from math import inf
 
 import numpy as np
 
-from signface.solver.bounds import (
-    AT_REST,
-    KNEE,
-    SMOOTHING,
-    holding_curvature,
-    holding_energy,
-    holding_slope,
-    released,
-)
+from signface.solver.bounds import AT_REST, KNEE, SMOOTHING, holding_curvature, holding_energy, holding_slope, released
 from signface.solver.loops import RENEW, finish, follow, products
 
 #: Rounds in which markers that stand too far off are drawn nearer. More change nothing that matters.
@@ -80,13 +72,7 @@ class Problem:
         self._bases[: len(bases), :n] = bases
 
     def solve(
-        self,
-        rows: np.ndarray,
-        first: np.ndarray | None,
-        stiffness: float,
-        pull: float,
-        release: bool,
-        tolerance: float,
+        self, rows: np.ndarray, first: np.ndarray | None, stiffness: float, pull: float, release: bool, tolerance: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Weights, residuals, farthest markers and numbers of steps of consecutive frames, in this thread.
 

@@ -180,10 +180,7 @@ def solve_pieces(
 
 
 def face_and_layout(
-    labels: Sequence[str],
-    settings: SolveSettings,
-    face: FaceModel | None = None,
-    layout: MarkerLayout | None = None,
+    labels: Sequence[str], settings: SolveSettings, face: FaceModel | None = None, layout: MarkerLayout | None = None
 ) -> tuple[FaceModel, MarkerLayout]:
     """The face and layout given, or those that the settings name for markers of these labels."""
     from signface.face.layout_files import choose_layout, read_layout

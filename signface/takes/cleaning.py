@@ -70,17 +70,12 @@ class Kept(Timed):
         The one pass over a long recording in which what holds for all of it is found.
         """
         step = max(1, -(-self.n_frames // most))
-        parts = []
+        blocks = []
         for begin, end in progress(pieces(self.n_frames, piece), "cleaning"):
-            part = self.frames(begin, end)[-begin % step :: step]
-            parts.append(part if step == 1 else part.copy())  # a part of an array would keep all of it
-        return Take(
-            np.concatenate(parts) if len(parts) > 1 else parts[0],
-            self.labels,
-            self.rate / step,
-            start=self.start,
-            name=self.name,
-        )
+            block = self.frames(begin, end)[-begin % step :: step]
+            blocks.append(block if step == 1 else block.copy())  # a part of an array would keep all of it
+        positions = np.concatenate(blocks) if len(blocks) > 1 else blocks[0]
+        return Take(positions, self.labels, self.rate / step, self.start, self.name)
 
 
 def cleaning_stages(

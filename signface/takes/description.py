@@ -22,9 +22,8 @@ def describe_take(take: Take) -> dict[str, Any]:
 
     Examples
     --------
-    >>> from signface.files import bundled_corpus
-    >>> from signface.takes.reading import read_take
-    >>> facts = describe_take(read_take(bundled_corpus() / "M1_IE_J.c3d"))
+    >>> import signface as sf
+    >>> facts = describe_take(sf.datasets.mini_take("M1_IE_J"))
     >>> facts["rate_hz"], facts["unit_found"]
     (200.0, 'mm')
     """

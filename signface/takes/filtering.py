@@ -44,12 +44,6 @@ def raised_sine_response(frequencies: np.ndarray, cutoff_hz: float, width_hz: fl
     return (np.sin(phase) + 1) / 2
 
 
-def _line_through_ends(signals: np.ndarray) -> np.ndarray:
-    """(n, K) straight lines from the first to the last of (n, K) signals."""
-    part = np.linspace(0.0, 1.0, len(signals))[:, None]
-    return signals[0] * (1 - part) + signals[-1] * part
-
-
 def _raised_sine(signals: np.ndarray, rate: float, cutoff_hz: float) -> np.ndarray:
     """(n, K) signals that begin and end at 0 through the spectral window, reflected oddly at both ends.
 
@@ -190,7 +184,8 @@ class Lowpass(Stage):
             if end - begin < 4:
                 continue
             signals = positions[begin:end, markers].reshape(end - begin, -1)
-            line = _line_through_ends(signals)  # passes as it is, however short the stretch
+            share = np.linspace(0.0, 1.0, len(signals))[:, None]
+            line = signals[0] * (1 - share) + signals[-1] * share  # passes as it is, however short the stretch
             smooth = line + answer(signals - line, self._rate, self.cutoff_hz)
             positions[begin:end, markers] = smooth.reshape(end - begin, len(markers), 3)
         return block.changed(positions)

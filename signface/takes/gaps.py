@@ -143,8 +143,8 @@ class _Carriers:
         over = apply(back, recorded[:, carriers]).reshape(len(recorded), -1)
         predicted = carried_middle + (over - middle) @ slopes
         errors = apply(back[[0, -1]], recorded[[0, -1], marker][:, None])[:, 0] - predicted[[0, -1]]
-        part = np.linspace(0.0, 1.0, end - begin + 2)[:, None]
-        joined = predicted + (1 - part) * errors[0] + part * errors[1]  # a line in time joins the known ends
+        share = np.linspace(0.0, 1.0, end - begin + 2)[:, None]
+        joined = predicted + (1 - share) * errors[0] + share * errors[1]  # a line in time joins the known ends
         return apply(poses[1:-1], joined[1:-1, None])[:, 0]
 
 

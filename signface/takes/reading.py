@@ -83,10 +83,6 @@ def open_recording(path: str | PathLike[str], *, unit: str | None = None) -> Tak
 def read_recording(path: str | PathLike[str], *, unit: str | None = None) -> Take | Descriptors:
     """Read all of a recording into memory; parameters and errors are those of `open_recording`.
 
-    Returns
-    -------
-    Take or Descriptors
-
     See Also
     --------
     signface.read_take : markers only.

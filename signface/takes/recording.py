@@ -14,13 +14,13 @@ from typing import Any, Protocol
 import numpy as np
 
 from signface.frames import TimedArrays
-from signface.takes.take import Take
+from signface.takes.take import Labelled, Take
 
 #: Frames worked on at a time: 46 markers then take 18 MB, and the two minutes of an ordinary take are two pieces.
 PIECE = 16384
 
 
-class Recording(Protocol):
+class Recording(Labelled, Protocol):
     """Trajectories of markers, in memory or on disk; attributes as of `Take`."""
 
     @property
@@ -30,13 +30,7 @@ class Recording(Protocol):
     def start(self) -> float: ...
 
     @property
-    def name(self) -> str: ...
-
-    @property
     def n_frames(self) -> int: ...
-
-    @property
-    def labels(self) -> tuple[str, ...]: ...
 
     @property
     def history(self) -> tuple[str, ...]: ...
@@ -85,14 +79,8 @@ class TakeFile(TimedArrays):
 
     def whole(self) -> Take:
         """All of it, in memory."""
-        return Take(
-            self.frames(0, self.n_frames),
-            self.labels,
-            self.rate,
-            start=self.start,
-            name=self.name,
-            history=self.history,
-        )
+        positions = self.frames(0, self.n_frames)
+        return Take(positions, self.labels, self.rate, self.start, self.name, self.history)
 
     def _rows(self, begin: int, end: int) -> dict[str, Any]:
         def read(first: int, last: int, step: int) -> np.ndarray:

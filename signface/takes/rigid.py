@@ -50,13 +50,7 @@ def rigid_transforms(source: np.ndarray, target: np.ndarray, weights: np.ndarray
 
 
 def apply(poses: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """(F, M, 3) points moved by poses.
-
-    Parameters
-    ----------
-    poses : (F, 4, 4) or (4, 4) array
-    points : (F, M, 3) or (M, 3) array
-    """
+    """(F, M, 3) or (M, 3) points moved by (F, 4, 4) poses, or all by one (4, 4) pose."""
     return np.matmul(points, np.swapaxes(poses[..., :3, :3], -1, -2)) + poses[..., None, :3, 3]
 
 

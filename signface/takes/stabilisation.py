@@ -191,10 +191,10 @@ def _bridge(poses: np.ndarray, longest: int) -> None:
             continue
         ends = [begin - 1, end]
         between = np.arange(begin, end)
-        part = ((between - ends[0]) / (ends[1] - ends[0]))[:, None]
+        share = ((between - ends[0]) / (ends[1] - ends[0]))[:, None]
         poses[begin:end] = np.eye(4)
         poses[begin:end, :3, :3] = Slerp(ends, Rotation.from_matrix(poses[ends, :3, :3]))(between).as_matrix()
-        poses[begin:end, :3, 3] = (1 - part) * poses[ends[0], :3, 3] + part * poses[ends[1], :3, 3]
+        poses[begin:end, :3, 3] = (1 - share) * poses[ends[0], :3, 3] + share * poses[ends[1], :3, 3]
 
 
 def least_moving(labels: Sequence[str], neutral: np.ndarray, sample: np.ndarray, name: str = "take") -> list[str]:
@@ -224,14 +224,14 @@ def least_moving(labels: Sequence[str], neutral: np.ndarray, sample: np.ndarray,
     if len(names) < 3:
         raise SignfaceError(f"the neutral frame shows {len(names)} markers, and 3 are needed", file=name)
     chosen = np.arange(len(names))
-    for part in (0.6, 0.35, 0.2):
+    for share in (0.6, 0.35, 0.2):
         slip = _slip(sample[:, chosen], neutral[chosen])
         poses, _ = _head_poses(sample[:, chosen], neutral[chosen], slip)
         away = np.linalg.norm(apply(inverse(poses), sample) - neutral, axis=2)
         seen = np.isfinite(away).mean(axis=0)
         moves = np.where(seen > 0.5, np.sqrt(np.nanmean(np.where(np.isfinite(away), away, 1e6) ** 2, axis=0)), np.inf)
         order = np.argsort(moves, kind="stable")
-        count = min(len(names), max(6, round(part * len(names))))
+        count = min(len(names), max(6, round(share * len(names))))
         while count < len(names) and flatness(neutral, np.isin(range(len(names)), order[:count])[None])[0] < 10.0:
             count += 1  # six points of one brow do not carry a head
         chosen = np.sort(order[:count])

@@ -148,15 +148,15 @@ class Staged(Timed):
     def block(self, begin: int, end: int, step: int = 1) -> Block:
         """Every `step`-th frame from `begin` to before `end`, behind the stage, with the head's poses where known."""
         if step > 1 and not self._stage.alone:
-            parts = [
-                self.block(first, last).positions[(begin - first) % step :: step]
-                for first, last in ((begin + one, begin + other) for one, other in pieces(end - begin, PIECE))
+            every = [
+                self.block(begin + first, begin + last).positions[-first % step :: step].copy()
+                for first, last in pieces(end - begin, PIECE)
             ]
-            return Block(np.concatenate([part.copy() for part in parts]), range(begin, end, step))
+            return Block(np.concatenate(every), range(begin, end, step))
         beside = 0 if step > 1 else self.n_frames if self._stage.reach is None else self._stage.reach
         first, last = max(0, begin - beside), min(self.n_frames, end + beside)
-        given = block_of(self._recording, first, last, step)
-        return self._stage.apply(replace(given, wanted=range(begin, end, step))).cut()
+        block = block_of(self._recording, first, last, step)
+        return self._stage.apply(replace(block, wanted=range(begin, end, step))).cut()
 
     def frames(self, begin: int, end: int, step: int = 1) -> np.ndarray:
         """(K, M, 3) positions of every `step`-th frame from `begin` to before `end`, behind the stage."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -78,12 +78,8 @@ class Take(TimedArrays, Content):
         if not (np.isfinite(self.rate) and self.rate > 0):
             raise SignfaceError(f"the rate must be positive, not {self.rate}", hint="export it with its rate")
         positions[~np.isfinite(positions).all(axis=2)] = np.nan  # a half-known or infinite point is a missing one
-        positions.setflags(write=False)
-        object.__setattr__(self, "positions", positions)
-        object.__setattr__(self, "labels", labels)
-        object.__setattr__(self, "rate", float(self.rate))
-        object.__setattr__(self, "start", float(self.start))
-        object.__setattr__(self, "history", tuple(self.history))
+        rate, start, history = float(self.rate), float(self.start), tuple(self.history)
+        self._hold(positions=positions, labels=labels, rate=rate, start=start, history=history)
 
     @property
     def n_frames(self) -> int:
@@ -144,10 +140,6 @@ class Take(TimedArrays, Content):
         attributes = {"units": "mm", "rate": self.rate, "history": "\n".join(self.history)}
         axes = ("time", "marker", "axis")
         return xarray.DataArray(self.positions.copy(), coordinates, axes, name=self.name, attrs=attributes)
-
-    def changed(self, operation: str, **fields: object) -> Take:
-        """A copy with some fields replaced and `operation` appended to its history."""
-        return replace(self, history=(*self.history, operation), **fields)  # type: ignore[arg-type]
 
 
 class Labelled(Protocol):

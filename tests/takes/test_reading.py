@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from signface.descriptors import Descriptors
 from signface.descriptors_files import write_weights
 from signface.errors import SignfaceError
-from signface.takes.formats.c3d import read_c3d, write_c3d
+from signface.takes.formats.c3d import open_c3d, write_c3d
 from signface.takes.formats.table import write_table
 from signface.takes.reading import read_recording, read_take, recognise
 from signface.takes.take import Take
@@ -90,7 +90,7 @@ def test_a_c3d_file_keeps_positions_gaps_rate_and_start(frames, markers, rate, f
     take = Take(positions, [f"M{number}" for number in range(markers)], rate, start=first / rate)
     file = tmp_path_factory.mktemp("c3d") / "take.c3d"
     write_c3d(take, file)
-    back = read_c3d(file)
+    back = open_c3d(file).whole()
     np.testing.assert_allclose(back.positions, take.positions, rtol=1e-6)
     assert back.rate == pytest.approx(rate, rel=1e-6)
     assert back.start == pytest.approx(take.start, abs=0.5 / rate)

@@ -1,6 +1,6 @@
 """C3D, the binary format of motion-capture systems.
 
-- `open_c3d`: a file whose frames are read in pieces; `read_c3d`: all of it, as a `Take`.
+- `open_c3d`: a file whose frames are read in pieces.
 - `write_c3d`: a `Take` to a file, through ezc3d.
 
 The format is described in the C3D User Guide (c3d.org): a header block of 512 bytes, a parameter section of groups
@@ -9,17 +9,16 @@ The format is described in the C3D User Guide (c3d.org): a header block of 512 b
 
 from __future__ import annotations
 
-from functools import partial
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
 from signface.errors import SignfaceError
-from signface.files import whole_file
+from signface.files import reading, whole_file
 from signface.takes.formats.c3d_structure import MOST_FRAMES, Structure, read_structure
 from signface.takes.formats.registry import FileHead, register_format
-from signface.takes.formats.units import SAMPLE, unit_factor
+from signface.takes.formats.units import in_millimetres
 from signface.takes.labels import clean_labels
 from signface.takes.recording import TakeFile
 from signface.takes.take import Take
@@ -74,16 +73,12 @@ def open_c3d(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
     def raw(begin: int, end: int, step: int = 1) -> np.ndarray:
         return _frames(file, structure, kept, begin, end, step)
 
-    sample = partial(raw, 0, structure.frames, max(1, structure.frames // SAMPLE))
-    try:
-        factor, note = unit_factor(units, unit, markers=len(kept), sample=sample)
-    except SignfaceError as error:
-        raise error.at(file) from error
+    read, note = in_millimetres(raw, structure.frames, units, unit, markers=len(kept), file=file)
     return TakeFile(
         tuple(names),
         structure.rate,
         structure.frames,
-        lambda begin, end, step: raw(begin, end, step) * factor,
+        read,
         start=structure.first / structure.rate,
         name=file.stem,
         history=(f"read {file.name} (C3D)", note, *notes),
@@ -94,19 +89,16 @@ def _frames(file: Path, structure: Structure, kept: list[int], begin: int, end: 
     """(K, M, 3) coordinates of some frames, as the file has them; NaN where a point is missing."""
     kind = np.dtype(structure.order + ("f4" if structure.scale < 0 else "i2"))
     width = structure.words * kind.itemsize
-    try:
-        with file.open("rb") as stream:
-            if step == 1:
-                stream.seek(structure.offset + begin * width)
-                content = stream.read((end - begin) * width)
-            else:
-                parts = []
-                for frame in range(begin, end, step):
-                    stream.seek(structure.offset + frame * width)
-                    parts.append(stream.read(width))
-                content = b"".join(parts)
-    except OSError as error:
-        raise SignfaceError(f"cannot be read ({error.strerror})", file=file) from error
+    with reading(file), file.open("rb") as stream:
+        if step == 1:
+            stream.seek(structure.offset + begin * width)
+            content = stream.read((end - begin) * width)
+        else:
+            rows = []
+            for frame in range(begin, end, step):
+                stream.seek(structure.offset + frame * width)
+                rows.append(stream.read(width))
+            content = b"".join(rows)
     frames = len(range(begin, end, step))
     if len(content) < frames * width:
         raise SignfaceError("has become shorter while it was read", file=file, hint="wait until it is written")
@@ -122,11 +114,6 @@ def _frames(file: Path, structure: Structure, kept: list[int], begin: int, end: 
         positions *= structure.scale
     positions[(numbers[..., 3] < 0) | (positions == 0).all(axis=2)] = np.nan
     return positions
-
-
-def read_c3d(path: str | PathLike[str], *, unit: str | None = None) -> Take:
-    """All of a C3D file in memory; see `open_c3d`."""
-    return open_c3d(path, unit=unit).whole()
 
 
 def write_c3d(take: Take, path: str | PathLike[str]) -> None:
@@ -149,7 +136,7 @@ def write_c3d(take: Take, path: str | PathLike[str]) -> None:
     --------
     >>> take = Take([[[1.0, 2, 3]], [[1, 2, np.nan]]], ("NOSE",), rate=50)
     >>> write_c3d(take, "take.c3d")
-    >>> read_c3d("take.c3d").positions.tolist()
+    >>> open_c3d("take.c3d").whole().positions.tolist()
     [[[1.0, 2.0, 3.0]], [[nan, nan, nan]]]
     """
     import ezc3d

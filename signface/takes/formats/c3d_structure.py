@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from signface.errors import SignfaceError
+from signface.files import reading
 
 BLOCK = 512
 MAGIC = 0x50
@@ -147,16 +148,13 @@ def read_structure(file: Path) -> Structure:
     SignfaceError
         It is no C3D file, or it has no points, or it is damaged or cut short; the message says where.
     """
-    try:
+    with reading(file), file.open("rb") as stream:
         size = file.stat().st_size
-        with file.open("rb") as stream:
-            header = stream.read(BLOCK)
-            if len(header) < 2 or header[1] != MAGIC or header[0] < 2:
-                raise SignfaceError("is no C3D file", file=file, hint="export the recording as C3D")
-            stream.seek((header[0] - 1) * BLOCK)
-            section = stream.read(255 * BLOCK)  # no parameter section is longer
-    except OSError as error:
-        raise SignfaceError(f"cannot be read ({error.strerror})", file=file) from error
+        header = stream.read(BLOCK)
+        if len(header) < 2 or header[1] != MAGIC or header[0] < 2:
+            raise SignfaceError("is no C3D file", file=file, hint="export the recording as C3D")
+        stream.seek((header[0] - 1) * BLOCK)
+        section = stream.read(255 * BLOCK)  # no parameter section is longer
     if len(header) < BLOCK or len(section) < BLOCK:
         raise _damaged(file, "it is cut short in its header")
     order = BYTE_ORDER.get(section[3])
@@ -204,11 +202,6 @@ def _parts(group: dict[str, _Parameter], name: str) -> list[_Parameter]:
     while (parameter := group.get(f"{name}{len(parts) + 1}" if parts else name)) is not None:
         parts.append(parameter)
     return parts
-
-
-def _count(group: dict[str, _Parameter], name: str) -> int:
-    """How many values a parameter and its continuations hold."""
-    return sum(math.prod(parameter.dimensions) for parameter in _parts(group, name))
 
 
 def _texts(group: dict[str, _Parameter], name: str) -> list[str]:
@@ -260,7 +253,8 @@ def _checked(
     channels = numbers.first(analog.get("USED"))
     if not (math.isfinite(rate) and math.isfinite(analog_rate) and 0 <= ratio <= 65535 and 0 <= channels <= 65535):
         raise _damaged(file, "its rates are not numbers")
-    if channels and min(_count(analog, "SCALE"), _count(analog, "OFFSET")) < channels:
+    calibrated = [sum(math.prod(part.dimensions) for part in _parts(analog, name)) for name in ("SCALE", "OFFSET")]
+    if channels and min(calibrated) < channels:
         raise _damaged(file, f"its {channels:g} analog channels have no scale or no offset")
     frames = last - first + 1 if first else last
     declared = numbers.first(point.get("FRAMES"))

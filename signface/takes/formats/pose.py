@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from signface.errors import SignfaceError
+from signface.files import reading
 from signface.takes.formats.registry import FileHead, register_format
 from signface.takes.take import Take
 
@@ -42,11 +43,11 @@ def _landmarks(pose: Any, file: Path) -> tuple[np.ndarray, np.ndarray, list[str]
         )
     component = pose.header.components[names.index(FACE)]
     begin = sum(len(other.points) for other in pose.header.components[: names.index(FACE)])
-    part = slice(begin, begin + len(component.points))
+    points = slice(begin, begin + len(component.points))
     with np.errstate(invalid="ignore"):  # NaN of the signalling kind
-        data = np.ma.getdata(pose.body.data)[:, :, part].astype(np.float64)
-    confidence = np.array(np.ma.getdata(pose.body.confidence)[:, :, part], dtype=np.float64)
-    if data.shape[0] == 0 or data.shape[1] == 0 or data.shape[2] == 0:
+        data = np.ma.getdata(pose.body.data)[:, :, points].astype(np.float64)
+    confidence = np.array(np.ma.getdata(pose.body.confidence)[:, :, points], dtype=np.float64)
+    if 0 in data.shape[:3]:
         raise SignfaceError("the .pose file shows nobody", file=file, hint="extract it again")
     notes = []
     person = int(np.argmax((confidence > 0).sum(axis=(0, 2))))
@@ -74,7 +75,7 @@ def _in_pixels(landmarks: np.ndarray, width: int, height: int, deep: bool) -> tu
     return landmarks, notes
 
 
-def _millimetres_per_pixel(landmarks: np.ndarray, names: list[str]) -> tuple[float, str]:
+def _millimetres_per_pixel(landmarks: np.ndarray, names: list[str], file: Path) -> tuple[float, str]:
     """One scale for the take: the median 3-D distance of the corners of the eyes is an adult's."""
     for one, other, distance in EYE_CORNERS:
         if one in names and other in names:
@@ -82,7 +83,8 @@ def _millimetres_per_pixel(landmarks: np.ndarray, names: list[str]) -> tuple[flo
             apart = apart[np.isfinite(apart)]
             if len(apart) and np.median(apart) > 0:
                 return distance / float(np.median(apart)), f"landmarks {one} and {other} are {distance} mm apart"
-    raise SignfaceError("the corners of the eyes are never seen, so the scale is unknown")
+    problem = "the corners of the eyes are never seen, so the scale is unknown"
+    raise SignfaceError(problem, file=file, hint="extract it with MediaPipe Holistic")
 
 
 def _certainty(head: FileHead) -> float:
@@ -96,11 +98,7 @@ def _certainty(head: FileHead) -> float:
 
 
 @register_format(
-    "pose",
-    title=".pose",
-    written_by="pose-format, from MediaPipe Holistic",
-    endings=(".pose",),
-    recognise=_certainty,
+    "pose", title=".pose", written_by="pose-format, from MediaPipe Holistic", endings=(".pose",), recognise=_certainty
 )
 def read_pose(path: str | PathLike[str], *, unit: str | None = None) -> Take:
     """Read the face landmarks of a `.pose` file as a take; labels are the landmarks' indices ("33", "263").
@@ -123,10 +121,8 @@ def read_pose(path: str | PathLike[str], *, unit: str | None = None) -> Take:
     from pose_format import Pose
 
     file = Path(path)
-    try:
+    with reading(file):
         content = file.read_bytes()
-    except OSError as error:
-        raise SignfaceError(f"cannot be read ({error.strerror})", file=file) from error
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -145,10 +141,7 @@ def read_pose(path: str | PathLike[str], *, unit: str | None = None) -> Take:
         warnings.simplefilter("ignore", RuntimeWarning)  # frames without a face
         dimensions = pose.header.dimensions
         landmarks, depth_notes = _in_pixels(landmarks, dimensions.width, dimensions.height, deep)
-    try:
-        scale, scale_note = _millimetres_per_pixel(landmarks, names)
-    except SignfaceError as error:
-        raise SignfaceError(error.problem, file=file, hint="extract it with MediaPipe Holistic") from error
+    scale, scale_note = _millimetres_per_pixel(landmarks, names, file)
     note = f"unit pixel, {scale:.4g} mm each, so that {scale_note} (an adult's eyes)"
     return Take(
         landmarks * (scale, -scale, -scale),

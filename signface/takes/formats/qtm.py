@@ -19,7 +19,6 @@ from signface.takes.formats.registry import FileHead, register_format
 from signface.takes.formats.text import TextFile, TextRows, marker_rows
 from signface.takes.labels import clean_labels
 from signface.takes.recording import TakeFile
-from signface.takes.take import Take
 
 #: The names that open header lines; a line that opens with a number is the first frame.
 HEADER_WORD = re.compile(r"^[A-Z][A-Z_]+$")
@@ -45,11 +44,7 @@ def _certainty(head: FileHead) -> float:
 
 
 @register_format(
-    "qtm",
-    title="Qualisys TSV",
-    written_by="Qualisys Track Manager",
-    endings=(".tsv",),
-    recognise=_certainty,
+    "qtm", title="Qualisys TSV", written_by="Qualisys Track Manager", endings=(".tsv",), recognise=_certainty
 )
 def open_qtm(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
     """Open a TSV file of Qualisys Track Manager with 3-D data and its header; frames are read when asked for.
@@ -86,16 +81,14 @@ def open_qtm(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
     if not (math.isfinite(rate) and rate > 0):
         raise SignfaceError("the TSV file has no rate", file=file, hint="set FREQUENCY to its frames per second")
     rows = lines[length:]
-    before = 0
+    before, time_at = 0, None
     if rows and rows[0].split("\t")[0].strip().lower() in ("frame", "time"):
         heads = [cell.strip().lower() for cell in rows[0].split("\t")]
         before = sum(1 for cell in heads[:2] if cell in ("frame", "time"))
         time_at = heads.index("time") if "time" in heads[:2] else None
         rows, length = rows[1:], length + 1
     elif rows and re.match(r"^[^\t]*[XYZ](\t|$)", rows[0].strip()):
-        time_at, rows, length = None, rows[1:], length + 1
-    else:
-        time_at = None
+        rows, length = rows[1:], length + 1
     filled = next((line for line in rows if line.strip()), "")
     if not before and len(filled.rstrip("\t\r\n ").split("\t")) == 3 * markers + 2:
         before, time_at = 2, 1  # frame and time without a line of column names
@@ -114,8 +107,3 @@ def open_qtm(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
         start=start if math.isfinite(start) else 0.0,
         history=(f"read {file.name} (Qualisys TSV)", *notes),
     )
-
-
-def read_qtm(path: str | PathLike[str], *, unit: str | None = None) -> Take:
-    """All of a TSV file in memory; see `open_qtm`."""
-    return open_qtm(path, unit=unit).whole()

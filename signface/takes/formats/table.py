@@ -1,6 +1,6 @@
 """CSV with one row a frame: `time_s`, then `LABEL_x, LABEL_y, LABEL_z` for each marker.
 
-- `open_table`, `read_table`, `write_table`.
+- `open_table`, `write_table`.
 """
 
 from __future__ import annotations
@@ -93,11 +93,6 @@ def open_table(path: str | PathLike[str], *, unit: str | None = None) -> TakeFil
         history=(f"read {file.name} (CSV)", *notes),
         zero_is_missing=False,
     )
-
-
-def read_table(path: str | PathLike[str], *, unit: str | None = None) -> Take:
-    """All of a wide CSV in memory; see `open_table`."""
-    return open_table(path, unit=unit).whole()
 
 
 def write_table(take: Take, path: str | PathLike[str]) -> None:

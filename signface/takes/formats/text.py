@@ -13,14 +13,14 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 
 from signface.errors import SignfaceError
-from signface.takes.formats.units import SAMPLE, unit_factor
+from signface.files import reading
+from signface.takes.formats.units import in_millimetres
 from signface.takes.recording import TakeFile
 
 #: Bytes that are looked through at a time for the beginnings of lines, and rows whose times are read at a time.
@@ -50,10 +50,8 @@ def read_text(file: Path) -> str:
     SignfaceError
         The file cannot be read, is empty, or is binary.
     """
-    try:
+    with reading(file):
         content = file.read_bytes()
-    except OSError as error:
-        raise SignfaceError(f"cannot be read ({error.strerror})", file=file) from error
     if not content.strip():
         raise SignfaceError("the file is empty", file=file, hint="export it again")
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -104,10 +102,8 @@ class TextFile:
     def _opened(self) -> BinaryIO:
         if self._content is not None:
             return io.BytesIO(self._content)
-        try:
+        with reading(self.file):
             return self.file.open("rb")
-        except OSError as error:
-            raise SignfaceError(f"cannot be read ({error.strerror})", file=self.file) from error
 
     def _index(self, begin: int) -> tuple[np.ndarray, np.ndarray]:
         """The attributes `starts` and `line_numbers`, from the bytes after the first `begin`."""
@@ -137,10 +133,7 @@ class TextFile:
         return np.concatenate([*starts, [at]]).astype(np.int64), np.concatenate([[], *numbers]).astype(np.int64)
 
     def lines(self, first: int, last: int, step: int = 1) -> list[tuple[int, str]]:
-        """Number and text of every `step`-th line from `first` to before `last`.
-
-        UTF-8, else Latin-1.
-        """
+        """Number and text (UTF-8, else Latin-1) of every `step`-th line from `first` to before `last`."""
         wanted = range(first, min(last, len(self)), step)
         if len(wanted) == 0:
             return []
@@ -149,13 +142,13 @@ class TextFile:
                 stream.seek(int(self.starts[first]))
                 content = stream.read(int(self.starts[wanted.stop] - self.starts[first]))
             else:
-                parts = []
+                rows = []
                 for line in wanted:
                     stream.seek(int(self.starts[line]))
-                    parts.append(
+                    rows.append(
                         stream.read(int(self.starts[line + 1] - self.starts[line])).rstrip(b"\r\n") + self._newline
                     )
-                content = b"".join(parts)
+                content = b"".join(rows)
         try:
             text = content.decode("utf-8")
         except UnicodeDecodeError:
@@ -195,7 +188,7 @@ class TextRows:
         lines = self.text.lines(self.first + begin, self.first + end, step)
         return numbers(lines, self.columns, self.separator, self.text.file, decimal=self.decimal)
 
-    def column(self, place: int) -> np.ndarray:
+    def column(self, number: int) -> np.ndarray:
         """One column of all rows.
 
         Raises
@@ -207,7 +200,7 @@ class TextRows:
         for begin in range(self.first, len(self.text), ROWS):
             lines = self.text.lines(begin, begin + ROWS)
             _check_cells(lines, self.columns, self.separator, self.text.file)
-            cells.extend(line.split(self.separator, place + 1)[place].strip() for _, line in lines)
+            cells.extend(line.split(self.separator, number + 1)[number].strip() for _, line in lines)
         try:
             return np.array([float(cell.replace(self.decimal, ".") or "nan") for cell in cells])
         except ValueError as error:
@@ -350,16 +343,12 @@ def marker_rows(
             positions[(positions == 0).all(axis=2)] = np.nan
         return positions
 
-    sample = partial(raw, 0, len(rows), max(1, len(rows) // SAMPLE))
-    try:
-        factor, note = unit_factor(units, unit, markers=len(labels), sample=sample)
-    except SignfaceError as error:
-        raise error.at(file) from error
+    read, note = in_millimetres(raw, len(rows), units, unit, markers=len(labels), file=file)
     return TakeFile(
         tuple(labels),
         rate,
         len(rows),
-        lambda begin, end, step: raw(begin, end, step) * factor,
+        read,
         start=start,
         name=file.stem,
         history=(history[0], note, *history[1:]),

@@ -17,7 +17,6 @@ from signface.takes.formats.registry import register_format
 from signface.takes.formats.text import TextFile, TextRows, even_rate, marker_rows
 from signface.takes.labels import clean_labels
 from signface.takes.recording import TakeFile
-from signface.takes.take import Take
 
 
 def _float(word: str) -> float:
@@ -88,8 +87,3 @@ def open_trc(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
         start=start if math.isfinite(start) else 0.0,
         history=(f"read {file.name} (TRC)", *notes),
     )
-
-
-def read_trc(path: str | PathLike[str], *, unit: str | None = None) -> Take:
-    """All of a TRC file in memory; see `open_trc`."""
-    return open_trc(path, unit=unit).whole()

@@ -2,12 +2,14 @@
 
 - `millimetres_per`: the factor of a named unit.
 - `unit_factor`: the factor of the unit that a file names (or does not), with a note for the history.
+- `in_millimetres`: a reader of positions made one of millimetres.
 """
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -79,11 +81,7 @@ def inferred_unit(positions: np.ndarray) -> str:
 
 
 def unit_factor(
-    in_file: str | Sequence[str] | None,
-    given: str | None,
-    *,
-    markers: int,
-    sample: Callable[[], np.ndarray],
+    in_file: str | Sequence[str] | None, given: str | None, *, markers: int, sample: Callable[[], np.ndarray]
 ) -> tuple[float | np.ndarray, str]:
     """What positions are to be multiplied with to be millimetres, and a note that says from which unit.
 
@@ -122,3 +120,24 @@ def unit_factor(
     each += [each[-1]] * (markers - len(each))
     factors = np.array([millimetres_per(unit) for unit in each])
     return factors[:, None], f"unit {', '.join(sorted(set(each)))} (one per marker)"
+
+
+def in_millimetres(
+    raw: Callable[[int, int, int], np.ndarray],
+    frames: int,
+    in_file: str | Sequence[str] | None,
+    given: str | None,
+    *,
+    markers: int,
+    file: Path,
+) -> tuple[Callable[[int, int, int], np.ndarray], str]:
+    """`raw(begin, end, step)`, which reads positions in the file's unit, made to read millimetres; and a note of it.
+
+    A unit that is not one of length is a `SignfaceError` that names the file.
+    """
+    step = max(1, frames // SAMPLE)
+    try:
+        factor, note = unit_factor(in_file, given, markers=markers, sample=lambda: raw(0, frames, step))
+    except SignfaceError as error:
+        raise error.at(file) from error
+    return lambda begin, end, step: raw(begin, end, step) * factor, note
