@@ -9,7 +9,7 @@ import signface as sf
 
 take = sf.read_take(sf.datasets.mini_file("M1_EU_11"))
 model = sf.load_model()
-settings = sf.SolveSettings(alpha=0.3)
+settings = sf.SolveSettings(layout="default-40")
 eva = sf.Signer("Eva")
 annotation = sf.annotate(take, model, settings=settings, signer=eva)
 files = sf.write_eaf(annotation, "take.eaf", replace=True)

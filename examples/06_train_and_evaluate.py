@@ -9,7 +9,7 @@ have not seen. (The corpus that ships has four takes: it shows how it is done, a
 import signface as sf
 
 corpus = sf.datasets.mini_corpus()  # or sf.read_corpus("corpora/feel")
-settings = sf.SolveSettings(alpha=0.3)
+settings = sf.SolveSettings(layout="default-40")
 examples = sf.solve_corpus(corpus, settings=settings)
 model = sf.train(examples, sf.TrainingSettings(classifier="knn3"), solve=settings)
 sf.save_model(model, "mine.skops")
