@@ -33,7 +33,7 @@ for entry in corpus:
 
 # %%
 # From here on it is as with affect; what nobody annotated is ``none``. Two synthetic takes are enough to show how it is
-# done, and tell nothing of how well: with another take left out, ``M2_SE_A``, the same classifier finds no brows at all.
+# done, and tell nothing of how well: with another take left out, ``M2_SE_A``, the same classifier finds no brows.
 
 *others, example = sf.solve_corpus(corpus, tier="brows")
 model = sf.train(others, sf.TrainingSettings(classifier="knn1", calibrate=False))
