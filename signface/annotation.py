@@ -61,10 +61,8 @@ class Annotation(Content):
 
     Examples
     --------
-    >>> from signface.files import bundled_corpus
-    >>> from signface.label.persistence import load_model
-    >>> from signface.takes.reading import read_take
-    >>> annotation = annotate(read_take(bundled_corpus() / "M1_IE_J.c3d"), load_model("default"), channels=True)
+    >>> import signface as sf
+    >>> annotation = annotate(sf.datasets.mini_take("M1_IE_J"), sf.load_model("default"), channels=True)
     >>> annotation
     <Annotation of M1_IE_J: 5 stable segments, 7 channels, by default>
     >>> annotation.channels["head"].table["value"].tolist()
@@ -124,12 +122,8 @@ class Annotation(Content):
     @property
     def facts(self) -> dict[str, str]:
         """What the header of an EAF says of it: `model`, `take`, `residual_mm`."""
-        residual = self.residual_mm
-        return {
-            "model": self.model,
-            "take": self.name,
-            "residual_mm": "unknown" if residual is None else f"{residual:.2f}",
-        }
+        residual = "unknown" if self.residual_mm is None else f"{self.residual_mm:.2f}"
+        return {"model": self.model, "take": self.name, "residual_mm": residual}
 
     def to_pympi(self, *, options: EafOptions | None = None) -> Eaf:
         """The tiers as an object of pympi-ling, for scripts (`signface.elan.writing.to_pympi`)."""
@@ -205,10 +199,8 @@ def annotate(
 
     Examples
     --------
-    >>> from signface.files import bundled_corpus
-    >>> from signface.label.persistence import load_model
-    >>> from signface.takes.reading import read_take
-    >>> annotation = annotate(read_take(bundled_corpus() / "M1_IE_J.c3d"), load_model("default"))
+    >>> import signface as sf
+    >>> annotation = annotate(sf.datasets.mini_take("M1_IE_J"), sf.load_model("default"))
     >>> annotation.segments.table["label"].tolist()[:3]
     ['N', 'NJ', 'J']
     """
@@ -222,9 +214,8 @@ def annotate(
     if channels is not False:
         from signface.channels.rules import find_channels, find_intensities, read_channels
 
-        thresholds = (
-            channels if isinstance(channels, Mapping) else read_channels("default" if channels is True else channels)
-        )
+        name = "default" if channels is True else channels
+        thresholds = name if isinstance(name, Mapping) else read_channels(name)
         events = {event.channel: event for event in find_channels(descriptors, thresholds)}
         if "intensity" in thresholds and "intensity" not in segments.table and model.card.tier == "affect":
             segments = find_intensities(descriptors, segments, thresholds)

@@ -188,7 +188,7 @@ def _colours(preferences: Path, name: str) -> dict[str, Colour]:
     for group in groups:
         for entry in group.iterfind("prefGroup") if group.get("key") == name else ():
             match = re.fullmatch(r"(\d{1,3}),(\d{1,3}),(\d{1,3})", (entry.findtext("pref/Object") or "").strip())
-            if match is not None and all(int(share) < 256 for share in match.groups()):
+            if match is not None and all(int(level) < 256 for level in match.groups()):
                 red, green, blue = map(int, match.groups())
                 colours[entry.get("key") or ""] = (red, green, blue)
     return colours

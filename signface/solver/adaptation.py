@@ -121,17 +121,7 @@ class MorphologicalAdaptation:
         return f"rbf passing by them, {self.smoothing:.1g}" if self.smoothing else "rbf"
 
     def transform(self, points: np.ndarray) -> np.ndarray:
-        """Positions on the avatar.
-
-        Parameters
-        ----------
-        points : (..., 3) array
-            Positions on the signer, for instance (F, P, 3). NaN stays NaN.
-
-        Returns
-        -------
-        (..., 3) array
-        """
+        """(..., 3) positions on the avatar from (..., 3) positions on the signer, such as (F, P, 3); NaN stays NaN."""
         points = np.asarray(points, dtype=np.float64)
         flat = points.reshape(-1, 3)
         result = np.empty_like(flat)
@@ -198,13 +188,7 @@ def make_adaptation(
 
 
 def _checked(source: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Neutral markers as arrays.
-
-    Raises
-    ------
-    SignfaceError
-        There are fewer than 4, they do not correspond, one is missing, or all stand on one point.
-    """
+    """Neutral markers as arrays, refused where there are fewer than 4, one is missing, or they do not correspond."""
     source, target = np.asarray(source, dtype=np.float64), np.asarray(target, dtype=np.float64)
     if source.shape != target.shape or source.ndim != 2 or source.shape[1] != 3:
         raise SignfaceError(

@@ -168,13 +168,7 @@ class MarkerBases:
         return ", ".join(involved[:8]) + (f" and {len(involved) - 8} more" if len(involved) > 8 else "")
 
     def checked(self, displacements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The displacements as (F, 3P) rows with 0 for missing markers, and the (F, P) bool array of present ones.
-
-        Raises
-        ------
-        SignfaceError
-            The shape does not fit the layout.
-        """
+        """`rows` with 0 for missing markers, and the (F, P) bool array of present ones."""
         rows = self.rows(displacements)
         present = np.isfinite(rows).reshape(len(rows), -1, 3).all(axis=2)
         if not present.all():
@@ -207,16 +201,9 @@ class MarkerBases:
 
 
 def presence_patterns(present: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Frames grouped by which markers they have.
+    """Frames grouped by which markers they have, from an (F, P) bool array.
 
-    Parameters
-    ----------
-    present : (F, P) bool array
-
-    Returns
-    -------
-    list of ((P,) bool array, (k,) int array)
-        Each pattern of present markers with the frames that show it; the frames without any marker are left out.
+    Each (P,) pattern of present markers with the (k,) frames that show it; frames without any marker are left out.
     """
     if present.all():
         return [(np.ones(present.shape[1], dtype=bool), np.arange(len(present)))]

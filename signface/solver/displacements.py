@@ -75,9 +75,9 @@ class Displacements(Stage):
     def note(self) -> str:
         """To which face, how, and by which markers."""
         dropped = [label for label in self._layout.face_labels if label not in self._labels]
-        note = f"adapted to {self._face.name} ({self.adaptation.description})"
-        note += f" by {len(self._labels)} markers of {self._layout.name}"
-        return note + (f" without {', '.join(dropped[:5])}{' ...' * (len(dropped) > 5)}" if dropped else "")
+        without = f" without {', '.join(dropped[:5])}{' ...' * (len(dropped) > 5)}" if dropped else ""
+        by = f"by {len(self._labels)} markers of {self._layout.name}"
+        return f"adapted to {self._face.name} ({self.adaptation.description}) {by}{without}"
 
 
 def neutral_places(recording: Recording, labels: Sequence[str], neutral_s: float) -> tuple[tuple[str, ...], np.ndarray]:

@@ -91,9 +91,9 @@ class Problem:
             states[:, 0, : len(first)] = first
         for begin in range(0, frames, BLOCK):
             some = slice(begin, min(begin + BLOCK, frames))
-            own, done = rows[some], steps[some]
-            right, solved, placed = right[: len(own)], solved[: len(own)], placed[: len(own)]
-            products(own, self._project, right)
+            block, done = rows[some], steps[some]
+            right, solved, placed = right[: len(block)], solved[: len(block)], placed[: len(block)]
+            products(block, self._project, right)
             for turn in range(1 + release):
                 if turn == 1:
                     right += pull * released(solved)
@@ -102,7 +102,7 @@ class Problem:
                     inverses[turn], states[turn], which, ages[turn], solved, done,
                 )  # fmt: skip
             products(solved, self._bases, placed)
-            finish(own, placed, solved, self.places, float(self.count), weights[some], residual[some], farthest[some])
+            finish(block, placed, solved, self.places, float(self.count), weights[some], residual[some], farthest[some])
         return weights, residual, farthest, steps
 
     def distances(self, weights: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -118,9 +118,9 @@ class Problem:
 
     def _apart(self, weights: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """(F, P, 3) from the solved markers to the given ones."""
-        own, placed = np.zeros((len(rows), len(self._quad))), np.empty((len(rows), len(self._bases)))
-        own[:, : len(self.places)] = weights[:, self.places]
-        products(own, self._bases, placed)
+        padded, placed = np.zeros((len(rows), len(self._quad))), np.empty((len(rows), len(self._bases)))
+        padded[:, : len(self.places)] = weights[:, self.places]
+        products(padded, self._bases, placed)
         return (rows - placed[:, : rows.shape[1]]).reshape(len(rows), -1, 3)
 
 
@@ -202,20 +202,20 @@ def _optimum(
     else:
         cuts = np.linspace(0, len(rows), spans + 1).astype(int)
         with ThreadPoolExecutor(spans) as pool:
-            parts = pool.map(
+            solved = pool.map(
                 lambda start, stop: problem.solve(rows[start:stop], first if start == 0 else None, *how),
                 cuts[:-1],
                 cuts[1:],
             )
-            weights, residual, farthest, steps = (np.concatenate(part) for part in zip(*parts))
+            weights, residual, farthest, steps = map(np.concatenate, zip(*solved))
     left = np.flatnonzero(steps == -2)
     if len(left):
         right = rows[left] @ problem.project.T
-        own = minimise_damped(problem.normal, right, bounds=bounds, sparsity=sparsity, tolerance=tolerance)
+        sure = minimise_damped(problem.normal, right, bounds=bounds, sparsity=sparsity, tolerance=tolerance)
         if release:
-            right = right + 0.5 * bounds * sparsity * released(own)
-            own = minimise_damped(problem.normal, right, bounds=bounds, sparsity=sparsity, tolerance=tolerance)
-        weights[np.ix_(left, problem.places)] = own
+            right = right + 0.5 * bounds * sparsity * released(sure)
+            sure = minimise_damped(problem.normal, right, bounds=bounds, sparsity=sparsity, tolerance=tolerance)
+        weights[np.ix_(left, problem.places)] = sure
         residual[left], farthest[left] = problem.distances(weights[left], rows[left])
     return weights, residual, farthest
 
@@ -223,7 +223,7 @@ def _optimum(
 def minimise_damped(
     normal: np.ndarray, right: np.ndarray, *, bounds: float, sparsity: float, tolerance: float
 ) -> np.ndarray:
-    """Weights at the optimum of every frame, by Newton's method with steps that are halved until the energy falls.
+    """(F, n) weights at the optimum of every frame, by Newton's method with steps halved until the energy falls.
 
     Parameters
     ----------
@@ -233,10 +233,6 @@ def minimise_damped(
         `r`.
     bounds, sparsity, tolerance
         See `minimise`.
-
-    Returns
-    -------
-    (F, n) array
     """
 
     def energy(c: np.ndarray, r: np.ndarray) -> np.ndarray:

@@ -156,7 +156,7 @@ def read_shown(path: str | PathLike[str], names: Sequence[str]) -> list[Shown]:
     if missing or not len(table):
         what = f"has no column {missing[0]}" if missing else "has no row"
         raise SignfaceError(what, file=path, hint="its columns are start_s, end_s, bases")
-    found = []
+    windows = []
     for line, (start, end, text) in enumerate(zip(table["start_s"], table["end_s"], table["bases"]), start=2):
         try:
             start_s, end_s = float(start), float(end)
@@ -165,15 +165,15 @@ def read_shown(path: str | PathLike[str], names: Sequence[str]) -> list[Shown]:
         if not (np.isfinite([start_s, end_s]).all() and start_s < end_s):
             raise SignfaceError(f"line {line}: the window from {start} to {end} s is empty", file=path)
         bases: list[str] = []
-        for name in (part.strip() for part in text.split("+")):
+        for name in map(str.strip, text.split("+")):
             bases += [f"{name[:-1]}{side}" for side in ("Left", "Right")] if name.endswith("*") else [name]
         unknown = [name for name in bases if name not in names]
         if unknown:
             raise SignfaceError(
                 f"line {line}: the face has no base named {unknown[0]!r}", file=path, hint=f"it has {', '.join(names)}"
             )
-        found.append(Shown(start_s, end_s, tuple(bases)))
-    return found
+        windows.append(Shown(start_s, end_s, tuple(bases)))
+    return windows
 
 
 def calibrate_shown(
@@ -217,34 +217,35 @@ def calibrate_shown(
     energy = (bases**2).sum(axis=(1, 2))
     moving = energy > 1e-4 * np.median(energy[energy > 0])
     time = start_s + np.arange(len(displacements)) / rate
-    parts = []
+    movements = []
     for window in shown:
         frames = np.flatnonzero((time >= window.start_s) & (time <= window.end_s))
-        own = [face.names.index(name) for name in window.bases if moving[face.names.index(name)]]
-        part = _from_rest(displacements[frames]) if len(frames) >= 10 and own else None
-        if part is not None:
-            parts.append((frames, own, part))
-    if not parts:
+        moved = [base for base in map(face.names.index, window.bases) if moving[base]]
+        movement = _from_rest(displacements[frames]) if len(frames) >= 10 and moved else None
+        if movement is not None:
+            movements.append((frames, moved, movement))
+    if not movements:
         raise SignfaceError(
             "no window of the calibration lies in the take and shows a base that moves its markers",
             hint="its times are seconds on the take's own clock",
         )
-    found, learnt = bases.copy(), sorted({base for _, own, _ in parts for base in own})
+    signers, learnt = bases.copy(), sorted({base for _, moved, _ in movements for base in moved})
     for _ in range(ROUNDS):
         weights = np.full((len(displacements), len(bases)), np.nan)
-        moved = np.full(displacements.shape, np.nan)
-        for frames, own, part in parts:
-            columns = found[own].reshape(len(own), -1).T
+        known = np.full(displacements.shape, np.nan)
+        for frames, moved, movement in movements:
+            columns = signers[moved].reshape(len(moved), -1).T
             weights[frames] = 0.0
-            solved = np.linalg.lstsq(columns, np.nan_to_num(part).reshape(len(part), -1).T, rcond=None)[0].T
-            weights[frames[:, None], own] = np.clip(solved, 0.0, STRONGEST)
-            moved[frames] = part
-        found = calibrate(moved, weights, bases, rate=rate, prior=prior)
+            rows = np.nan_to_num(movement).reshape(len(movement), -1)
+            solved = np.linalg.lstsq(columns, rows.T, rcond=None)[0].T
+            weights[frames[:, None], moved] = np.clip(solved, 0.0, STRONGEST)
+            known[frames] = movement
+        signers = calibrate(known, weights, bases, rate=rate, prior=prior)
         for base in learnt:
-            along = float((found[base] * bases[base]).sum() / energy[base])
-            alike = along * np.sqrt(energy[base]) / max(float(np.linalg.norm(found[base])), 1e-12)
-            found[base] = found[base] / along if alike > ALIKE else bases[base]
-    return found, [face.names[base] for base in learnt]
+            along = float((signers[base] * bases[base]).sum() / energy[base])
+            alike = along * np.sqrt(energy[base]) / max(float(np.linalg.norm(signers[base])), 1e-12)
+            signers[base] = signers[base] / along if alike > ALIKE else bases[base]
+    return signers, [face.names[base] for base in learnt]
 
 
 def _from_rest(displacements: np.ndarray) -> np.ndarray | None:

@@ -22,10 +22,8 @@ def recognise_layout(take: Take, face: FaceModel) -> dict[str, Any]:
 
     Examples
     --------
-    >>> from signface.face.reading import read_face
-    >>> from signface.files import bundled_corpus
-    >>> from signface.takes.reading import read_take
-    >>> recognise_layout(read_take(bundled_corpus() / "M1_IE_J.c3d"), read_face("default"))["missing"]
+    >>> import signface as sf
+    >>> recognise_layout(sf.datasets.mini_take(), sf.read_face())["missing"]
     []
     """
     try:

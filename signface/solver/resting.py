@@ -12,13 +12,12 @@ stretch near the median pose it is 0.38 and 1.9 mm, and 0.31 and 1.4 mm.
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.solver.adaptation import make_adaptation
+from signface.solver.displacements import neutral_places
 from signface.solver.thin_shell import ThinShellSolver
 from signface.takes.neutral import find_neutral, neutral_candidates
 from signface.takes.rigid import apply, inverse, rigid_transforms
@@ -26,8 +25,6 @@ from signface.takes.take import Take
 
 #: Frames on which a candidate is tried.
 FRAMES = 60
-#: Half the time around a candidate over which its markers' median places are taken (s).
-AROUND_S = 0.05
 
 
 def resting_time(take: Take, face: FaceModel, layout: MarkerLayout, *, adaptation: str = "similarity") -> float:
@@ -70,12 +67,11 @@ def resting_time(take: Take, face: FaceModel, layout: MarkerLayout, *, adaptatio
     skin, carried = take.select(labels), take.select(head)
     scores = []
     for time in candidates:
-        frame, reach = take.frame_at(time), int(AROUND_S * take.rate)
-        around = slice(max(0, frame - reach), frame + reach + 1)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # markers that are not seen there: see _unexplained
-            rest, place = np.nanmedian(skin[around], axis=0), np.nanmedian(carried[around], axis=0)
-        scores.append(_unexplained(solver, skin[frames], carried[frames], rest, place, target, adaptation))
+        (seen, rest), (carriers, neutral) = (neutral_places(take, names, time) for names in (labels, head))
+        if len(seen) == len(labels) and len(carriers) == len(head):
+            scores.append(_unexplained(solver, skin[frames], carried[frames], rest, neutral, target, adaptation))
+        else:
+            scores.append(np.inf)
     return candidates[int(np.argmin(scores))] if np.isfinite(scores).any() else candidates[0]
 
 
@@ -84,15 +80,13 @@ def _unexplained(
     skin: np.ndarray,
     carried: np.ndarray,
     rest: np.ndarray,
-    place: np.ndarray,
+    neutral: np.ndarray,
     target: np.ndarray,
     adaptation: str,
 ) -> float:
     """Share of the movement that the avatar does not explain when `rest` is the neutral face; inf when unknown."""
-    if not (np.isfinite(rest).all() and np.isfinite(place).all()):
-        return np.inf
     weights = np.isfinite(carried[..., 0]).astype(float)
-    poses = rigid_transforms(place, np.nan_to_num(carried), weights)
+    poses = rigid_transforms(neutral, np.nan_to_num(carried), weights)
     moved = apply(inverse(poses), skin)[weights.sum(axis=1) >= 3]
     onto = rigid_transforms(rest, target[None], np.ones((1, len(rest))))
     rest, moved = apply(onto, rest[None])[0], apply(np.repeat(onto, len(moved), axis=0), moved)

@@ -11,6 +11,8 @@ it. One that is no longer than a piece is cleaned once.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -82,9 +84,8 @@ def solve(
 
     Examples
     --------
-    >>> from signface.files import bundled_corpus
-    >>> from signface.takes.reading import read_take
-    >>> solve(read_take(bundled_corpus() / "M1_IE_J.c3d")).weights.shape
+    >>> import signface as sf
+    >>> solve(sf.datasets.mini_take("M1_IE_J")).weights.shape
     (2149, 51)
     """
     pieces = solve_pieces(
@@ -97,21 +98,15 @@ def solve(
         piece=piece,
         progress=progress,
     )
-    parts = list(pieces)
-    if len(parts) == 1:
-        return parts[0]
-    return Descriptors(
-        weights=np.concatenate([part.weights for part in parts]),
-        names=parts[0].names,
-        rate=recording.rate,
-        start=recording.start,
-        residual=np.concatenate([part.residual for part in parts if part.residual is not None]),
-        head=np.concatenate([part.head for part in parts if part.head is not None]),
-        deviation=None if parts[0].deviation is None else np.concatenate([part.deviation for part in parts]),
-        name=recording.name,
-        history=parts[-1].history,
-        settings=parts[0].settings,
-    )
+    solved = list(pieces)
+    if len(solved) == 1:
+        return solved[0]
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(one, name) for one in solved])
+        for name in ("weights", "residual", "head", "deviation")
+        if getattr(solved[0], name) is not None
+    }
+    return replace(solved[0], history=solved[-1].history, **arrays)
 
 
 def solve_pieces(
@@ -129,10 +124,6 @@ def solve_pieces(
 
     Parameters and errors are those of `solve`. The last piece has the history of the whole take; how many gaps were
     filled, say, is not known before.
-
-    Yields
-    ------
-    Descriptors
 
     See Also
     --------
@@ -158,9 +149,7 @@ def solve_pieces(
     known = solver if isinstance(solver, ThinShellSolver) else None
     if uncertainty and known is None:
         raise SignfaceError(f"the method {settings.method} does not say how uncertain it is", hint="use thin-shell")
-    note = f"{preparation.note}; solve {settings.method}" + "".join(
-        f" {name}={value:g}" for name, value in given.items()
-    )
+    note = " ".join([f"{preparation.note}; solve {settings.method}", *(f"{k}={v:g}" for k, v in given.items())])
     warnings = [f"warning: {known.markers.warning}"] if known is not None and known.markers.warning else []
     for begin, end in progress(pieces(recording.n_frames, piece), "solving"):
         displacements, head = preparation.frames(begin, end)

@@ -89,10 +89,9 @@ class ThinShellSolver:
 
     Examples
     --------
-    >>> from signface.face.layout_files import read_layout
-    >>> from signface.face.reading import read_face
-    >>> face = read_face("default")
-    >>> layout = read_layout("default-40", face)
+    >>> import signface as sf
+    >>> face = sf.read_face()
+    >>> layout = sf.read_layout("default-40", face)
     >>> smile = 0.8 * layout.bases(face)[[face.names.index("mouthSmileLeft")]]
     >>> solution = ThinShellSolver(face, layout).solve(smile)
     >>> solution.weights.shape, face.names[solution.weights[0].argmax()]
@@ -124,8 +123,8 @@ class ThinShellSolver:
         self._reach = slip * np.sqrt(self.markers.scale / self.markers.n_markers) if slip > 0.0 else np.inf
         observed = self.markers.observed
         shell = np.zeros((int(observed.sum()),) * 2)
-        for part in thin_shell_matrices(face):
-            seen = part[np.ix_(observed, observed)]
+        for energy in thin_shell_matrices(face):
+            seen = energy[np.ix_(observed, observed)]
             shell += 0.5 * seen / np.diag(seen).mean()
         self.shell = TOLERANCE**2 * self.alpha * shell
         self.holding = 1.0 - self.alpha
@@ -140,8 +139,8 @@ class ThinShellSolver:
         self._prior[slack, slack] = 1.0 / (head_slack * self.markers.scale) if head_slack > 0.0 else 0.0
         full = self._columns.T @ self._columns + self._prior
         # Rounding must not make bases that are opposed to one another (an eye turned in and out) undetermined.
-        own = np.arange(self._n)
-        full[own, own] += 1e-12 * np.trace(full[: self._n, : self._n])
+        bases = np.arange(self._n)
+        full[bases, bases] += 1e-12 * np.trace(full[: self._n, : self._n])
         self._full = 0.5 * (full + full.T)
         self._inverse = _inverse(self._full)
         self._whole = self._problem(np.ones(self.markers.n_markers, dtype=bool))
@@ -154,7 +153,7 @@ class ThinShellSolver:
         """
         rows, present = self.markers.checked(displacements)
         error = (weights @ self.markers.matrix.T - rows) / np.sqrt(self.markers.scale)
-        own = weights[:, self.markers.observed]
+        acting = weights[:, self.markers.observed]
         data = np.zeros(len(rows))
         for pattern, frames in presence_patterns(present):
             seen = np.repeat(pattern, 3)
@@ -165,32 +164,18 @@ class ThinShellSolver:
             wanted[: len(motions)] = error[np.ix_(frames, seen)].T
             left = wanted - stacked @ np.linalg.lstsq(stacked, wanted, rcond=None)[0]
             data[frames] = (left**2).sum(axis=0)
-        shell = np.einsum("fi,ij,fj->f", own, self.shell, own)
-        held = holding_energy(own, self.sparsity)
+        shell = np.einsum("fi,ij,fj->f", acting, self.shell, acting)
+        held = holding_energy(acting, self.sparsity)
         if first is not None:
-            held -= self.sparsity * released(first[:, self.markers.observed]) * own
+            held -= self.sparsity * released(first[:, self.markers.observed]) * acting
         return data + shell + self.holding * held.sum(axis=1)
 
     def solve(self, displacements: np.ndarray) -> Solution:
-        """Weights of each frame at the optimum of the energy.
-
-        Parameters
-        ----------
-        displacements : (F, P, 3) array
-            Displacements of the layout's face markers from their neutral places (eq. 5.21), in the face's unit; NaN
-            where a marker is missing.
-
-        Returns
-        -------
-        Solution
-        """
-        parts = [
-            self._solve_chunk(displacements[start : start + CHUNK])
-            for start in range(0, max(1, len(displacements)), CHUNK)
-        ]
-        return Solution(
-            np.concatenate([part.weights for part in parts]), np.concatenate([part.residual for part in parts])
-        )
+        """Weights of each frame at the optimum of the energy; see `signface.solver.base.Solver`."""
+        starts = range(0, max(1, len(displacements)), CHUNK)
+        chunks = [self._solve_chunk(displacements[start : start + CHUNK]) for start in starts]
+        weights, residual = ([getattr(chunk, name) for chunk in chunks] for name in ("weights", "residual"))
+        return Solution(np.concatenate(weights), np.concatenate(residual))
 
     def _solve_chunk(self, displacements: np.ndarray) -> Solution:
         rows = self.markers.rows(displacements)
@@ -202,9 +187,8 @@ class ThinShellSolver:
             for pattern, frames in presence_patterns(present):
                 before = weights[max(left[frames[0]] - 1, 0), self._whole.places]
                 first = before if np.isfinite(before).all() else None
-                weights[left[frames]], residual[left[frames]] = self._minimise(
-                    some[frames], self._problem(pattern), first
-                )
+                solved = self._minimise(some[frames], self._problem(pattern), first)
+                weights[left[frames]], residual[left[frames]] = solved
         return Solution(weights, residual)
 
     def _minimise(
@@ -262,17 +246,18 @@ class ThinShellSolver:
         """
         observed = self.markers.observed
         result = np.full(np.shape(weights), np.nan)
-        own = np.asarray(weights)[:, observed]
-        held = self.holding * holding_curvature(own, self.sparsity)
+        acting = np.asarray(weights)[:, observed]
+        held = self.holding * holding_curvature(acting, self.sparsity)
         # D is the squared error over `scale`: a log-likelihood is it times scale / (2 * marker_error^2).
-        factor = np.broadcast_to(marker_error, len(own))[:, None] / np.sqrt(self.markers.scale)
-        diagonal = np.arange(own.shape[1])
+        factor = np.broadcast_to(marker_error, len(acting))[:, None] / np.sqrt(self.markers.scale)
+        diagonal = np.arange(acting.shape[1])
         normal = self._whole.normal
-        for start in range(0, len(own), 1024):
-            hessian = np.broadcast_to(normal, (len(own[start : start + 1024]), *normal.shape)).copy()
-            hessian[:, diagonal, diagonal] += 0.5 * held[start : start + 1024]
+        for start in range(0, len(acting), 1024):
+            some = slice(start, start + 1024)
+            hessian = np.broadcast_to(normal, (len(acting[some]), *normal.shape)).copy()
+            hessian[:, diagonal, diagonal] += 0.5 * held[some]
             variance = np.linalg.inv(hessian)[:, diagonal, diagonal]
-            result[start : start + 1024, observed] = factor[start : start + 1024] * np.sqrt(np.maximum(variance, 0.0))
+            result[some, observed] = factor[some] * np.sqrt(np.maximum(variance, 0.0))
         return result
 
     def _problem(self, pattern: np.ndarray) -> Problem:
@@ -306,12 +291,7 @@ class ThinShellSolver:
 
 
 class Stream:
-    """Frames of one live capture, each solved from the one pushed before it; made by `ThinShellSolver.stream`.
-
-    Parameters
-    ----------
-    solver : ThinShellSolver
-    """
+    """Frames of one live capture, each solved from the one pushed before it; made by `ThinShellSolver.stream`."""
 
     def __init__(self, solver: ThinShellSolver) -> None:
         self._solver = solver
@@ -319,18 +299,7 @@ class Stream:
         self._last: np.ndarray | None = None
 
     def push(self, frame: np.ndarray) -> Solution:
-        """Weights of one frame.
-
-        Parameters
-        ----------
-        frame : (P, 3) array
-            Displacements of the face markers, as for `ThinShellSolver.solve`.
-
-        Returns
-        -------
-        Solution
-            Of one frame; the same weights as `solve` gives.
-        """
+        """Weights of one frame, as `solve` gives them, from its (P, 3) displacements of the face markers."""
         solver = self._solver
         rows, present = solver.markers.checked(np.asarray(frame, dtype=np.float64)[None])
         if not present.any():

@@ -25,7 +25,8 @@ STILL = 1e-3
 NOVEL = 1e-4
 
 
-def _kernel(a: np.ndarray, b: np.ndarray, length: float) -> np.ndarray:
+def gaussian_kernel(a: np.ndarray, b: np.ndarray, length: float) -> np.ndarray:
+    """(A, B) `exp(-|a - b|^2 / 2 length^2)` of (A, k) and (B, k) points."""
     squared = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2.0 * a @ b.T
     return np.exp(-np.maximum(squared, 0.0) / (2.0 * length**2))
 
@@ -49,7 +50,7 @@ def choose_kernel(inputs: np.ndarray, outputs: np.ndarray) -> tuple[float, float
     best = (-np.inf, 1.0, NOISES[0])
     for factor in LENGTHS:
         length = factor * np.sqrt(inputs.shape[1])
-        values, vectors = np.linalg.eigh(_kernel(inputs, inputs, length))
+        values, vectors = np.linalg.eigh(gaussian_kernel(inputs, inputs, length))
         squared = (vectors.T @ outputs) ** 2
         for noise in NOISES:
             spread = np.maximum(values, 0.0) + noise
@@ -92,8 +93,8 @@ class GaussianProcess(_Scaled):
 
     def predict(self, X: np.ndarray) -> np.ndarray:
         """(F, N) posterior means."""
-        found = self.process_.predict(np.asarray(X, dtype=np.float64))
-        return self.mean_ + self.deviation_ * found.reshape(len(found), -1)
+        scaled = self.process_.predict(np.asarray(X, dtype=np.float64))
+        return self.mean_ + self.deviation_ * scaled.reshape(len(scaled), -1)
 
 
 class SparseOnlineGaussianProcess(_Scaled):
@@ -130,7 +131,7 @@ class SparseOnlineGaussianProcess(_Scaled):
 
     def _see(self, row: np.ndarray, target: np.ndarray) -> None:
         n = self._count
-        k = _kernel(row[None], self.vectors_[:n], self.length_)[0]
+        k = gaussian_kernel(row[None], self.vectors_[:n], self.length_)[0]
         ck = self._c[:n, :n] @ k
         variance = self.noise_ + 1.0 + k @ ck
         pull = (target - k @ self._alpha[:n]) / variance
@@ -159,11 +160,11 @@ class SparseOnlineGaussianProcess(_Scaled):
         alpha, c, q = self._alpha[:n], self._c[:n, :n], self._q[:n, :n]
         diagonal = np.maximum(np.diag(q) + np.diag(c), 1e-12)
         out = int(np.argmin((alpha**2).sum(axis=1) / diagonal))
-        own_q, own_c, column_q, column_c = q[out, out], c[out, out], q[:, out].copy(), c[:, out].copy()
-        alpha -= np.outer(column_q / own_q, alpha[out])
-        crossed = np.outer(column_q, column_c) / own_q
-        c += own_c * np.outer(column_q, column_q) / own_q**2 - crossed - crossed.T
-        q -= np.outer(column_q, column_q) / own_q
+        q_out, c_out, column_q, column_c = q[out, out], c[out, out], q[:, out].copy(), c[:, out].copy()
+        alpha -= np.outer(column_q / q_out, alpha[out])
+        crossed = np.outer(column_q, column_c) / q_out
+        c += c_out * np.outer(column_q, column_q) / q_out**2 - crossed - crossed.T
+        q -= np.outer(column_q, column_q) / q_out
         last = n - 1  # the last takes the place of the one that goes
         for matrix in (self._c, self._q):
             matrix[out, :n], matrix[:n, out] = matrix[last, :n].copy(), matrix[:n, last].copy()
@@ -173,5 +174,5 @@ class SparseOnlineGaussianProcess(_Scaled):
 
     def predict(self, X: np.ndarray) -> np.ndarray:
         """(F, N) posterior means."""
-        kernel = _kernel(np.asarray(X, dtype=np.float64), self.vectors_, self.length_)
+        kernel = gaussian_kernel(np.asarray(X, dtype=np.float64), self.vectors_, self.length_)
         return self.mean_ + self.deviation_ * (kernel @ self.alpha_)

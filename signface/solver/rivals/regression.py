@@ -17,7 +17,7 @@ from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.solver.base import MarkerBases, Solution, presence_patterns
-from signface.solver.rivals import gaussian_process
+from signface.solver.rivals.gaussian_process import GaussianProcess, SparseOnlineGaussianProcess, gaussian_kernel
 
 #: Pairs made where none are given, and the jitter of their markers beside the typical displacement.
 PAIRS, JITTER = 800, 0.02
@@ -62,13 +62,12 @@ class _Learnt:
         for pattern, frames in presence_patterns(present):
             if not pattern.all():
                 seen = np.repeat(pattern, 3)
-                own = self._covariance[np.ix_(seen, seen)]
-                own = own + 1e-4 * np.trace(own) / len(own) * np.eye(len(own))
-                expected = np.linalg.solve(own, self._covariance[np.ix_(seen, ~seen)])
+                among = self._covariance[np.ix_(seen, seen)]
+                among = among + 1e-4 * np.trace(among) / len(among) * np.eye(len(among))
+                expected = np.linalg.solve(among, self._covariance[np.ix_(seen, ~seen)])
                 filled[np.ix_(frames, ~seen)] = rows[np.ix_(frames, seen)] @ expected
-        weights = np.concatenate(
-            [self._predict(part / self._scale) for part in np.array_split(filled, -(-len(rows) // 4096))]
-        )
+        chunks = np.array_split(filled / self._scale, -(-len(rows) // 4096))
+        weights = np.concatenate([self._predict(chunk) for chunk in chunks])
         return self.markers.solution(weights, rows, present)
 
     def _learn(self, inputs: np.ndarray, weights: np.ndarray) -> None:
@@ -78,18 +77,6 @@ class _Learnt:
         raise AssertionError("each mapping has its own")
 
 
-def _gaussian(left: np.ndarray, right: np.ndarray, width: float) -> np.ndarray:
-    """(A, B) Gaussian kernel of (A, k) and (B, k) points."""
-    squared = (left**2).sum(axis=1)[:, None] + (right**2).sum(axis=1) - 2.0 * left @ right.T
-    return np.exp(-np.maximum(squared, 0.0) / (2.0 * width**2))
-
-
-def _median_distance(points: np.ndarray) -> float:
-    from scipy.spatial.distance import pdist
-
-    return float(np.median(pdist(points[:500])))
-
-
 class RbfNetwork(_Learnt):
     """`sum_l c_l exp(-|x - x_l|^2 / 2 sigma^2)` with regularised coefficients (eq. 2.13 and 2.14).
 
@@ -97,29 +84,29 @@ class RbfNetwork(_Learnt):
     """
 
     def _learn(self, inputs: np.ndarray, weights: np.ndarray) -> None:
-        self._centres, self._width = inputs, 2.0 * _median_distance(inputs)
-        kernel = _gaussian(inputs, inputs, self._width)
+        from scipy.spatial.distance import pdist
+
+        self._centres, self._width = inputs, 2.0 * float(np.median(pdist(inputs[:500])))
+        kernel = gaussian_kernel(inputs, inputs, self._width)
         self._coefficients = np.linalg.solve(kernel.T @ kernel + 1e-3 * np.eye(len(kernel)), kernel.T @ weights)
 
     def _predict(self, inputs: np.ndarray) -> np.ndarray:
-        return _gaussian(inputs, self._centres, self._width) @ self._coefficients
+        return gaussian_kernel(inputs, self._centres, self._width) @ self._coefficients
 
 
 class GaussianProcessSolve(_Learnt):
     """Gaussian process regression, see `signface.solver.rivals.gaussian_process`."""
 
+    estimator: type[GaussianProcess | SparseOnlineGaussianProcess] = GaussianProcess
+
     def _learn(self, inputs: np.ndarray, weights: np.ndarray) -> None:
-        self._process = gaussian_process.GaussianProcess().fit(inputs, weights)
+        self._process = self.estimator().fit(inputs, weights)
 
     def _predict(self, inputs: np.ndarray) -> np.ndarray:
         return self._process.predict(inputs)
 
 
-class SparseGaussianProcessSolve(_Learnt):
+class SparseGaussianProcessSolve(GaussianProcessSolve):
     """A Gaussian process that takes one pair at a time and keeps the most telling of them."""
 
-    def _learn(self, inputs: np.ndarray, weights: np.ndarray) -> None:
-        self._process = gaussian_process.SparseOnlineGaussianProcess().fit(inputs, weights)
-
-    def _predict(self, inputs: np.ndarray) -> np.ndarray:
-        return self._process.predict(inputs)
+    estimator = SparseOnlineGaussianProcess
