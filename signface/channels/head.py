@@ -142,7 +142,7 @@ def _movements(angle: np.ndarray, rate: float, rule: Mapping[str, Any]) -> list[
     turns = swings(angle, rule["min_swing_deg"])
     spans = [_moving_part(angle, a, b) for a, b in pairwise(turns)]
     longest = rule["max_swing_ms"] / 1000 * rate
-    found, first = [], 0
+    movements, first = [], 0
     while first < len(spans):
         last = first
         while (
@@ -151,9 +151,9 @@ def _movements(angle: np.ndarray, rate: float, rule: Mapping[str, Any]) -> list[
             last += 1
         if last - first >= rule["min_swings"]:
             widths = [abs(angle[turns[i + 1]] - angle[turns[i]]) for i in range(first, last)]
-            found.append((spans[first][0], spans[last - 1][1] + 1, (last - first) / 2, float(np.median(widths))))
+            movements.append((spans[first][0], spans[last - 1][1] + 1, (last - first) / 2, float(np.median(widths))))
         first = max(last, first + 1)
-    return found
+    return movements
 
 
 def _follows(spans: list[tuple[int, int]], first: int, swing: int, longest: float) -> bool:

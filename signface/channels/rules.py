@@ -44,9 +44,8 @@ def read_channels(name: str | PathLike[str] = "default") -> dict[str, dict[str, 
     try:
         content = tomllib.loads(file.read_text("utf-8"))
     except OSError as error:
-        raise SignfaceError(
-            "no such file of channels", file=file, hint=f"shipped ones are {', '.join(known)}"
-        ) from error
+        hint = f"shipped ones are {', '.join(known)}"
+        raise SignfaceError("no such file of channels", file=file, hint=hint) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise SignfaceError(f"is no TOML ({error})", file=file) from error
     for channel, table in content.items():
@@ -86,7 +85,7 @@ def find_channels(
     """
     rules = read_channels() if channels is None else channels
     solved = np.isfinite(descriptors.residual if descriptors.residual is not None else np.nan).any()
-    found = []
+    channel_events = []
     for channel, table in rules.items():
         if channel == "intensity" or (table.get("measured_only") and solved):
             continue
@@ -104,24 +103,21 @@ def find_channels(
                 continue
             together = [tuple(pair) for pair in table.get("together", [])]
             events = _weight_events(descriptors, signals, dict(_values(table)), together)
-        found.append(ChannelEvents(channel, str(table.get("description", channel)), _vocabulary(table), events))
-    return found
+        channel_events.append(_as_events(channel, table, events))
+    return channel_events
 
 
 def closed_vocabularies(channels: Mapping[str, Mapping[str, Any]]) -> list[ChannelEvents]:
     """Every channel with the values that it can hold and no events."""
     empty = pd.DataFrame(columns=["start_s", "end_s", "value"])
-    return [
-        ChannelEvents(channel, str(table.get("description", channel)), _vocabulary(table), empty)
-        for channel, table in channels.items()
-        if channel != "intensity"
-    ]
+    return [_as_events(channel, table, empty) for channel, table in channels.items() if channel != "intensity"]
 
 
-def _vocabulary(table: Mapping[str, Any]) -> dict[str, str]:
-    """Every value of a channel and its description, those of pairs among them."""
+def _as_events(channel: str, table: Mapping[str, Any], events: pd.DataFrame) -> ChannelEvents:
+    """Events with every value that the channel can hold and its description, those of pairs among them."""
     values = {value: str(rule.get("description", "")) for value, rule in _values(table)}
-    return values | {joined: f"{first} and {second} together" for first, second, joined in table.get("together", [])}
+    values |= {joined: f"{first} and {second} together" for first, second, joined in table.get("together", [])}
+    return ChannelEvents(channel, str(table.get("description", channel)), values, events)
 
 
 def find_intensities(

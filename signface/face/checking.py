@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
@@ -76,7 +76,6 @@ def check_face(face: FaceModel, layout: MarkerLayout | None = None) -> FaceRepor
     layout : MarkerLayout, optional
         To say as well which bases move no marker.
     """
-    duplicates = _duplicates(face)
     edges, uses = _edges(face.mesh)
     moved = np.linalg.norm(face.bases, axis=2).max(axis=1)
     seen = face.bases if layout is None else layout.bases(face)
@@ -89,7 +88,7 @@ def check_face(face: FaceModel, layout: MarkerLayout | None = None) -> FaceRepor
     singular = np.linalg.svd(columns, compute_uv=False) if len(columns) else np.ones(1)
     fewer = min(columns.shape) < len(columns)  # more bases than coordinates: some mixture moves nothing
     return FaceReport(
-        duplicate_vertices=duplicates,
+        duplicate_vertices=len(face.mesh.vertices) - len(np.unique(_signature(face), axis=0)),
         unreferenced_vertices=len(face.mesh.vertices) - len(np.unique(face.mesh.triangles)),
         degenerate_triangles=int(_degenerate(face.mesh).sum()),
         nonmanifold_edges=int((uses > 2).sum()),
@@ -122,31 +121,23 @@ def clean_face(face: FaceModel) -> tuple[FaceModel, np.ndarray]:
     _, once = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
     triangles = triangles[np.sort(once)]
     keep = np.unique(triangles)
-    place = np.full(len(face.mesh.vertices), -1)
-    place[keep] = np.arange(len(keep))
-    number = place[target]
-    cleaned = FaceModel(
-        mesh=Mesh(face.mesh.vertices[keep], place[triangles]),
+    number = np.full(len(face.mesh.vertices), -1)
+    number[keep] = np.arange(len(keep))
+    cleaned = replace(
+        face,
+        mesh=Mesh(face.mesh.vertices[keep], number[triangles]),
         bases=face.bases[:, keep],
-        names=face.names,
-        unit=face.unit,
         identities=None if face.identities is None else face.identities[:, keep],
-        identity_names=face.identity_names,
-        name=face.name,
         history=(*face.history, "clean_face"),
         colours=None if face.colours is None else face.colours[keep],
     )
-    return cleaned, number
+    return cleaned, number[target]
 
 
 def _signature(face: FaceModel) -> np.ndarray:
     """(V, 3 + 3 N) position and displacements of each vertex, in whole micrometres."""
     all_shapes = np.concatenate([face.mesh.vertices[None], face.bases])
     return np.round(all_shapes.transpose(1, 0, 2).reshape(len(face.mesh.vertices), -1) * 1000).astype(np.int64)
-
-
-def _duplicates(face: FaceModel) -> int:
-    return len(face.mesh.vertices) - len(np.unique(_signature(face), axis=0))
 
 
 def _degenerate(mesh: Mesh) -> np.ndarray:

@@ -81,7 +81,7 @@ class MarkerLayout(Content):
         return cls(labels, roles, np.array(corners), np.array(barycentric), name)
 
     def _of(self, role: str) -> tuple[str, ...]:
-        return tuple(label for label, own in zip(self.labels, self.roles) if own == role)
+        return tuple(label for label, kind in zip(self.labels, self.roles) if kind == role)
 
     @property
     def face_labels(self) -> tuple[str, ...]:
@@ -96,16 +96,11 @@ class MarkerLayout(Content):
     def restricted(self, labels: Sequence[str]) -> MarkerLayout:
         """The layout with only the given markers, in the layout's own order."""
         keep = [i for i, label in enumerate(self.labels) if label in set(labels)]
-        return MarkerLayout(
-            tuple(self.labels[i] for i in keep),
-            tuple(self.roles[i] for i in keep),
-            self.corners[keep],
-            self.barycentric[keep],
-            self.name,
-        )
+        names, roles = (tuple(values[i] for i in keep) for values in (self.labels, self.roles))
+        return MarkerLayout(names, roles, self.corners[keep], self.barycentric[keep], self.name)
 
     def interpolate(self, values: np.ndarray, labels: Sequence[str] | None = None) -> np.ndarray:
-        """Values at the markers from values at the vertices.
+        """(..., len(labels), 3) values at the markers from values at the vertices.
 
         Parameters
         ----------
@@ -113,10 +108,6 @@ class MarkerLayout(Content):
             A quantity per vertex: neutral positions, displacements of a base.
         labels : sequence of str, optional
             Which markers; by default the face markers.
-
-        Returns
-        -------
-        (..., len(labels), 3) array
 
         Raises
         ------

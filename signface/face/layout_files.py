@@ -83,8 +83,8 @@ def _columns(file: Path) -> dict[str, np.ndarray]:
     if len(set(heads)) < len(heads) or any(len(row) > len(heads) for row in rows):
         raise SignfaceError("cannot be read as a csv", file=file, hint="every row has as many cells as the first")
     return {
-        head: np.array([row[place] if place < len(row) else "" for row in rows], dtype=str)
-        for place, head in enumerate(heads)
+        head: np.array([row[number] if number < len(row) else "" for row in rows], dtype=str)
+        for number, head in enumerate(heads)
     }
 
 
@@ -143,13 +143,13 @@ def write_layout(layout: MarkerLayout, path: str | PathLike[str], face: FaceMode
     rows = []
     scale = 1.0 / MILLIMETRES.get(face.unit, 1.0)
     for row, (label, role) in enumerate(zip(layout.labels, layout.roles, strict=True)):
-        place: tuple[object, ...] = (None, None, None, None)
+        cells: tuple[object, ...] = (None, None, None, None)
         if on_vertex[row]:
-            place = (int(layout.corners[row, np.argmax(layout.barycentric[row])]), None, None, None)
+            cells = (int(layout.corners[row, np.argmax(layout.barycentric[row])]), None, None, None)
         elif layout.corners[row, 0] >= 0:
             point = layout.points(face, [label])[0] * scale
-            place = (None, *(round(float(value), 5) for value in point))
-        rows.append((label, role, *place))
+            cells = (None, *(round(float(value), 5) for value in point))
+        rows.append((label, role, *cells))
     import pandas as pd
 
     table = pd.DataFrame(rows, columns=["marker", "role", "vertex", "x", "y", "z"]).astype({"vertex": "Int64"})
@@ -192,12 +192,7 @@ def choose_layout(take_labels: Sequence[str], face: FaceModel) -> MarkerLayout:
 
 
 def nearest_points(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The nearest points of a mesh.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    points : (K, 3) array
+    """The points of a mesh nearest to (K, 3) points.
 
     Returns
     -------
@@ -214,13 +209,12 @@ def nearest_points(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarr
     # The nearest centroid is a point of the mesh, so no triangle farther off than that can hold a nearer one.
     bound = tree.query(points)[0]
     candidates = tree.query_ball_point(points, bound + reach + 1e-9)
-    owner = np.repeat(np.arange(len(points)), [len(own) for own in candidates])
-    triangle = np.concatenate([np.sort(own) for own in candidates]) if len(points) else np.zeros(0)
-    triangle = triangle.astype(np.int64)
+    owner = np.repeat(np.arange(len(points)), [len(near) for near in candidates])
+    triangle = np.concatenate([np.zeros(0, np.int64), *(np.sort(near).astype(np.int64) for near in candidates)])
     a, b, c = (mesh.vertices[mesh.triangles[triangle, k]] for k in range(3))
     weights = _closest_barycentric(points[owner], a, b, c)
-    found = weights[:, :1] * a + weights[:, 1:2] * b + weights[:, 2:] * c
-    apart = np.linalg.norm(found - points[owner], axis=1)
+    nearest = weights[:, :1] * a + weights[:, 1:2] * b + weights[:, 2:] * c
+    apart = np.linalg.norm(nearest - points[owner], axis=1)
     order = np.lexsort((triangle, apart, owner))
     best = order[np.searchsorted(owner[order], np.arange(len(points)))]
     return mesh.triangles[triangle[best]], weights[best], apart[best]

@@ -94,17 +94,7 @@ class FaceModel(Content):
         return len(self.bases)
 
     def pose(self, weights: np.ndarray) -> np.ndarray:
-        """Vertices for given weights.
-
-        Parameters
-        ----------
-        weights : (N,) or (F, N) array
-
-        Returns
-        -------
-        (V, 3) or (F, V, 3) array
-            Positions in millimetres.
-        """
+        """(V, 3) or (F, V, 3) positions of the vertices for (N,) or (F, N) weights, millimetres."""
         weights = np.asarray(weights, dtype=np.float64)
         if weights.shape[-1] != self.n_bases:
             raise SignfaceError(f"{self.name} has {self.n_bases} bases but {weights.shape[-1]} weights were given")

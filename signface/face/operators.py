@@ -27,10 +27,6 @@ def stiffness_and_mass(mesh: Mesh) -> tuple[sparse.csr_matrix, np.ndarray]:
     The Laplacian is the robust one of Sharp and Crane, "A Laplacian for Nonmanifold Triangle Meshes" (2020), which
     stays positive semidefinite on needle-shaped and non-manifold triangles.
 
-    Parameters
-    ----------
-    mesh : Mesh
-
     Returns
     -------
     stiffness : (V, V) sparse matrix

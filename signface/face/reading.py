@@ -143,9 +143,8 @@ def read_identities() -> tuple[np.ndarray, tuple[str, ...]]:
         with np.load(file, allow_pickle=False) as content:
             return content["hundredths_mm"].astype(np.float64) / 100.0, tuple(map(str, content["names"]))
     except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        raise SignfaceError(
-            "the shipped head shapes cannot be read", file=file, hint="install signface again"
-        ) from error
+        problem = "the shipped head shapes cannot be read"
+        raise SignfaceError(problem, file=file, hint="install signface again") from error
 
 
 @lru_cache(maxsize=1)

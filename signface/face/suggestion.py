@@ -59,10 +59,6 @@ def suggest_layout(labels: Sequence[str], points: np.ndarray, face: FaceModel) -
         Positions in millimetres in any frame of reference; NaN for a missing marker, which is left out.
     face : FaceModel
 
-    Returns
-    -------
-    Suggestion
-
     Raises
     ------
     SignfaceError
@@ -101,13 +97,13 @@ def suggest_layout(labels: Sequence[str], points: np.ndarray, face: FaceModel) -
 
 def _similarity(source: np.ndarray, target: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Rotation (3, 3), shift (3,) and scale that bring source points onto target points best (S. Umeyama, 1991)."""
-    own = weight / weight.sum()
-    middle, goal = own @ source, own @ target
+    share = weight / weight.sum()
+    middle, goal = share @ source, share @ target
     a, b = source - middle, target - goal
-    u, singular, vt = np.linalg.svd((b * own[:, None]).T @ a)
+    u, singular, vt = np.linalg.svd((b * share[:, None]).T @ a)
     sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
     rotation = (u * sign) @ vt
-    scale = float(np.clip((singular * sign).sum() / max((own[:, None] * a**2).sum(), 1e-12), *SCALES))
+    scale = float(np.clip((singular * sign).sum() / max((share[:, None] * a**2).sum(), 1e-12), *SCALES))
     return rotation, goal - scale * rotation @ middle, scale
 
 
@@ -132,9 +128,8 @@ def _likely_motions(points: np.ndarray, lively: np.ndarray, most: int = 6) -> li
     that explains points spread over the skin that moves. Unlike nearest points alone, it asks that the markers cover
     that skin, so they do not slide about on a smooth skull.
     """
-    some = _spread(points, 60)
-    skin = lively[_spread_rows(lively, 200)]
-    found: list[tuple[float, np.ndarray]] = []
+    some, skin = _spread(points, 60), _spread(lively, 200)
+    ways: list[tuple[float, np.ndarray]] = []
     middle = np.median(some, axis=0)
     for start in _starts(some - middle):
         rotation, shift = start, skin.mean(axis=0) - start @ middle
@@ -157,9 +152,9 @@ def _likely_motions(points: np.ndarray, lively: np.ndarray, most: int = 6) -> li
             if abs(variance - before) < 1e-4 * before:
                 break
         cost = float(-np.log(total / (2 * np.pi * variance) ** 1.5).mean())
-        found.append((cost, points @ rotation.T + shift))
+        ways.append((cost, points @ rotation.T + shift))
     different: list[np.ndarray] = []
-    for _, moved in sorted(found, key=lambda way: way[0]):
+    for _, moved in sorted(ways, key=lambda way: way[0]):
         if all(np.abs(moved - other).max() > 15.0 for other in different):
             different.append(moved)
     return different[:most]
@@ -176,18 +171,14 @@ def _starts(centred: np.ndarray) -> list[np.ndarray]:
     return starts
 
 
-def _spread_rows(points: np.ndarray, count: int) -> np.ndarray:
-    """Rows of at most `count` points spread evenly: each next one is the farthest from those before."""
+def _spread(points: np.ndarray, count: int) -> np.ndarray:
+    """At most `count` of the points spread evenly: each next one is the farthest from those before."""
     rows = [int(np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
     distance = np.linalg.norm(points - points[rows[0]], axis=1)
     while len(rows) < min(count, len(points)):
         rows.append(int(np.argmax(distance)))
         distance = np.minimum(distance, np.linalg.norm(points - points[rows[-1]], axis=1))
-    return np.array(rows)
-
-
-def _spread(points: np.ndarray, count: int) -> np.ndarray:
-    return points[_spread_rows(points, count)]
+    return points[rows]
 
 
 def _warp(placed: np.ndarray, fine: np.ndarray, skin: cKDTree) -> np.ndarray:

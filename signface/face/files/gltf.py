@@ -88,22 +88,7 @@ def write_face(face: FaceModel, path: str | PathLike[str]) -> None:
     SignfaceError
         The ending is not `.glb`, or the file cannot be written.
     """
-    from pygltflib import (
-        GLTF2,
-        Accessor,
-        AccessorSparseIndices,
-        AccessorSparseValues,
-        Asset,
-        Attributes,
-        Buffer,
-        Material,
-        Mesh,
-        Node,
-        PbrMetallicRoughness,
-        Primitive,
-        Scene,
-        Sparse,
-    )
+    import pygltflib as gl
 
     if Path(path).suffix.lower() != ".glb":
         raise SignfaceError("a face is written as .glb", file=path, hint="choose a name that ends in .glb")
@@ -116,55 +101,51 @@ def write_face(face: FaceModel, path: str | PathLike[str]) -> None:
 
     positions = face.mesh.vertices.astype("<f4")
     view = blob.add(positions, _ARRAY_BUFFER)
-    accessors.append(Accessor(bufferView=view, componentType=_FLOAT, count=count, type="VEC3", **bounds(positions)))
+    accessors.append(gl.Accessor(bufferView=view, componentType=_FLOAT, count=count, type="VEC3", **bounds(positions)))
     kind = _UINT16 if count < 65535 else _UINT32
     view = blob.add(face.mesh.triangles.astype(_COMPONENTS[kind]).ravel(), _ELEMENT_ARRAY_BUFFER)
-    accessors.append(Accessor(bufferView=view, componentType=kind, count=3 * len(face.mesh.triangles), type="SCALAR"))
+    accessors.append(
+        gl.Accessor(bufferView=view, componentType=kind, count=3 * len(face.mesh.triangles), type="SCALAR")
+    )
     targets = []
     for base in face.bases:
         values = base.astype("<f4")
         moved = np.flatnonzero(values.any(axis=1))
-        accessor = Accessor(componentType=_FLOAT, count=count, type="VEC3", **bounds(values))
+        accessor = gl.Accessor(componentType=_FLOAT, count=count, type="VEC3", **bounds(values))
         if len(moved):  # the specification wants at least one element in a sparse accessor
-            accessor.sparse = Sparse(
+            where = blob.add(moved.astype(_COMPONENTS[kind]))
+            accessor.sparse = gl.Sparse(
                 count=len(moved),
-                indices=AccessorSparseIndices(bufferView=blob.add(moved.astype(_COMPONENTS[kind])), componentType=kind),
-                values=AccessorSparseValues(bufferView=blob.add(values[moved])),
+                indices=gl.AccessorSparseIndices(bufferView=where, componentType=kind),
+                values=gl.AccessorSparseValues(bufferView=blob.add(values[moved])),
             )
-        targets.append(Attributes(POSITION=len(accessors)))
+        targets.append(gl.Attributes(POSITION=len(accessors)))
         accessors.append(accessor)
-    attributes = Attributes(POSITION=0)
+    attributes = gl.Attributes(POSITION=0)
     colour = [0.80, 0.62, 0.52, 1.0]
     if face.colours is not None:
         steps = np.column_stack([np.round(face.colours * 255), np.full(count, 255)]).astype("u1")
         view = blob.add(steps, _ARRAY_BUFFER)
         attributes.COLOR_0 = len(accessors)
-        accessors.append(Accessor(bufferView=view, componentType=5121, normalized=True, count=count, type="VEC4"))
+        accessors.append(gl.Accessor(bufferView=view, componentType=5121, normalized=True, count=count, type="VEC4"))
         colour = [1.0, 1.0, 1.0, 1.0]
-    gltf = GLTF2(
-        asset=Asset(version="2.0", generator="signface", extras={"history": list(face.history)}),
+    mesh = gl.Mesh(
+        name=face.name,
+        primitives=[gl.Primitive(attributes=attributes, indices=1, material=0, targets=targets)],
+        weights=[0.0] * face.n_bases,
+        extras={"targetNames": list(face.names), "unit": "mm"},
+    )
+    surface = gl.PbrMetallicRoughness(baseColorFactor=colour, metallicFactor=0.0, roughnessFactor=0.7)
+    gltf = gl.GLTF2(
+        asset=gl.Asset(version="2.0", generator="signface", extras={"history": list(face.history)}),
         scene=0,
-        scenes=[Scene(nodes=[0])],
-        nodes=[Node(mesh=0, name=face.name, scale=[0.001, 0.001, 0.001])],
-        meshes=[
-            Mesh(
-                name=face.name,
-                primitives=[Primitive(attributes=attributes, indices=1, material=0, targets=targets)],
-                weights=[0.0] * face.n_bases,
-                extras={"targetNames": list(face.names), "unit": "mm"},
-            )
-        ],
-        materials=[
-            Material(
-                name="skin",
-                pbrMetallicRoughness=PbrMetallicRoughness(
-                    baseColorFactor=colour, metallicFactor=0.0, roughnessFactor=0.7
-                ),
-            )
-        ],
+        scenes=[gl.Scene(nodes=[0])],
+        nodes=[gl.Node(mesh=0, name=face.name, scale=[0.001, 0.001, 0.001])],
+        meshes=[mesh],
+        materials=[gl.Material(name="skin", pbrMetallicRoughness=surface)],
         accessors=accessors,
         bufferViews=blob.views,
-        buffers=[Buffer(byteLength=len(blob.data))],
+        buffers=[gl.Buffer(byteLength=len(blob.data))],
     )
     gltf.set_binary_blob(bytes(blob.data))
     with whole_file(path) as temporary:
@@ -189,29 +170,16 @@ def read_gltf(path: str | PathLike[str]) -> RawFace:
     try:
         if file.stat().st_size == 0:
             raise SignfaceError("is empty", file=file, hint=hint)
-        gltf = GLTF2.load_from_bytes(file.read_bytes()) if _is_binary(file) else GLTF2.load_json(str(file))
+        content = file.read_bytes()
+        gltf = GLTF2.load_from_bytes(content) if content[:4] == b"glTF" else GLTF2.load_json(str(file))
         if gltf is None:
             raise SignfaceError("is not a glTF file", file=file, hint=hint)
         gltf._path = file.parent
         return _face_of(gltf, file)
     except SignfaceError:
         raise
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        IndexError,
-        TypeError,
-        AttributeError,
-        struct.error,
-        RecursionError,
-    ) as error:
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, struct.error, RecursionError) as error:
         raise SignfaceError("cannot be read as glTF (foreign, damaged or cut short)", file=file, hint=hint) from error
-
-
-def _is_binary(file: Path) -> bool:
-    with file.open("rb") as stream:
-        return stream.read(4) == b"glTF"
 
 
 def _face_of(gltf: Any, file: Path) -> RawFace:
@@ -232,35 +200,35 @@ def _face_of(gltf: Any, file: Path) -> RawFace:
     for primitive in mesh.primitives:
         if primitive.mode not in (None, 4):
             raise SignfaceError("its mesh is not made of triangles", file=file, hint="triangulate it")
-        own = _accessor(gltf, primitive.attributes.POSITION, file)
-        if own.shape[1:] != (3,):
+        positions = _accessor(gltf, primitive.attributes.POSITION, file)
+        if positions.shape[1:] != (3,):
             raise SignfaceError("its vertex positions are not three-dimensional", file=file)
         if primitive.indices is None:
-            corners = np.arange(len(own))
+            corners = np.arange(len(positions))
         else:
             corners = _accessor(gltf, primitive.indices, file).ravel().astype(np.int64)
-        if len(corners) % 3 or (len(corners) and corners.max() >= len(own)):
+        if len(corners) % 3 or (len(corners) and corners.max() >= len(positions)):
             raise SignfaceError("its triangles name vertices it does not have", file=file, hint="export it again")
-        moved = np.zeros((total, len(own), 3))
+        moved = np.zeros((total, len(positions), 3))
         for number, target in enumerate(primitive.targets or ()):
             accessor = target.get("POSITION") if isinstance(target, dict) else target.POSITION
             if accessor is None:
                 continue
             shape = _accessor(gltf, accessor, file)
-            if shape.shape != own.shape:
+            if shape.shape != positions.shape:
                 raise SignfaceError(
-                    f"morph target {number} has {len(shape)} vertices but the mesh has {len(own)}",
+                    f"morph target {number} has {len(shape)} vertices but the mesh has {len(positions)}",
                     file=file,
                     hint="all shapes of a face must share one topology",
                 )
             moved[number] = shape
-        vertices.append(own)
+        vertices.append(positions)
         bases.append(moved)
         painted = getattr(primitive.attributes, "COLOR_0", None)
         if painted is not None:
             colours.append(_accessor(gltf, painted, file)[:, :3])
         triangles.append(corners.reshape(-1, 3) + offset)
-        offset += len(own)
+        offset += len(positions)
     extras = mesh.extras if isinstance(mesh.extras, dict) else {}
     names = extras.get("targetNames") or [f"target{number}" for number in range(total)]
     if len(names) != total:

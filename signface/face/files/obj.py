@@ -44,9 +44,8 @@ def read_obj(path: str | PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
                 corners = [corner - 1 if corner > 0 else len(vertices) + corner for corner in corners]
                 triangles += [(corners[0], b, c) for b, c in pairwise(corners[1:])]
         except ValueError as error:
-            raise SignfaceError(
-                f"line {number} is damaged: {line[:40]!r}", file=file, hint="export it again"
-            ) from error
+            problem = f"line {number} is damaged: {line[:40]!r}"
+            raise SignfaceError(problem, file=file, hint="export it again") from error
     if not vertices or not triangles:
         raise SignfaceError("has no mesh", file=file, hint="an OBJ file of a face has vertices (v) and faces (f)")
     points, corners_ = np.array(vertices), np.array(triangles, dtype=np.int64)
@@ -70,19 +69,21 @@ def read_obj_folder(folder: str | PathLike[str], neutral: str | None = None) -> 
     SignfaceError
         No OBJ files, no neutral, or a file of another topology.
     """
-    place = Path(folder)
-    files = {file.stem: file for file in sorted(place.iterdir()) if file.suffix.lower() == ".obj"}
+    directory = Path(folder)
+    files = {file.stem: file for file in sorted(directory.iterdir()) if file.suffix.lower() == ".obj"}
     if len(files) < 2:
         raise SignfaceError(
-            f"has {len(files)} OBJ files", file=place, hint="a face needs a neutral and one file for each base"
+            f"has {len(files)} OBJ files", file=directory, hint="a face needs a neutral and one file for each base"
         )
     if neutral is not None:
         stem = neutral[:-4] if neutral.lower().endswith(".obj") else neutral
     else:
-        stem = next((own for own in files if own.lower() in NEUTRAL_NAMES), "")
+        stem = next((name for name in files if name.lower() in NEUTRAL_NAMES), "")
     if stem not in files:
         problem = f"has no neutral named {neutral}" if neutral else "does not say which file is the neutral"
-        raise SignfaceError(problem, file=place, hint=f"name one with --neutral-shape: {', '.join(list(files)[:8])}")
+        raise SignfaceError(
+            problem, file=directory, hint=f"name one with --neutral-shape: {', '.join(list(files)[:8])}"
+        )
     vertices, triangles = read_obj(files[stem])
     bases, names = [], []
     for name, file in files.items():

@@ -100,7 +100,7 @@ def _units(lines: list[str], vertices: int) -> tuple[np.ndarray, tuple[str, ...]
                 raise ValueError("a unit names a vertex that does not exist")
             moved[int(vertex)] = [float(word) for word in offset]
             left -= 1
-        own = name or f"unit{len(units)}"
-        names.append(own if own not in names else f"{own} ({len(units)})")
+        title = name or f"unit{len(units)}"
+        names.append(title if title not in names else f"{title} ({len(units)})")
         units.append(moved)
     return np.stack(units) if units else np.zeros((0, vertices, 3)), tuple(names)
