@@ -62,7 +62,7 @@ class Annotation(Content):
     Examples
     --------
     >>> import signface as sf
-    >>> annotation = annotate(sf.datasets.mini_take("M1_IE_J"), sf.load_model("default"), channels=True)
+    >>> annotation = sf.annotate(sf.datasets.mini_take("M1_IE_J"), sf.load_model("default"), channels=True)
     >>> annotation
     <Annotation of M1_IE_J: 5 stable segments, 7 channels, by default>
     >>> annotation.channels["head"].table["value"].tolist()
@@ -200,7 +200,7 @@ def annotate(
     Examples
     --------
     >>> import signface as sf
-    >>> annotation = annotate(sf.datasets.mini_take("M1_IE_J"), sf.load_model("default"))
+    >>> annotation = sf.annotate(sf.datasets.mini_take("M1_IE_J"), sf.load_model("default"))
     >>> annotation.segments.table["label"].tolist()[:3]
     ['N', 'NJ', 'J']
     """

@@ -37,7 +37,8 @@ def mini_corpus() -> Corpus:
 
     Examples
     --------
-    >>> [entry.name for entry in mini_corpus()]
+    >>> import signface as sf
+    >>> [entry.name for entry in sf.datasets.mini_corpus()]
     ['M1_IE_J', 'M1_EU_11', 'M2_SE_A', 'M2_EU_04']
     """
     from signface.corpus.manifest import read_corpus
@@ -55,7 +56,8 @@ def mini_file(name: str = "M2_EU_04") -> Path:
 
     Examples
     --------
-    >>> mini_file("M1_IE_J").name
+    >>> import signface as sf
+    >>> sf.datasets.mini_file("M1_IE_J").name
     'M1_IE_J.c3d'
     """
     return _file(name, f"{name}.c3d")
@@ -75,7 +77,8 @@ def mini_take(name: str = "M2_EU_04") -> Take:
 
     Examples
     --------
-    >>> take = mini_take()
+    >>> import signface as sf
+    >>> take = sf.datasets.mini_take()
     >>> take.n_frames, len(take.labels), take.rate
     (1184, 46, 200.0)
     """
@@ -98,7 +101,8 @@ def mini_weights(name: str = "M2_EU_04") -> Descriptors:
 
     Examples
     --------
-    >>> weights = mini_weights()
+    >>> import signface as sf
+    >>> weights = sf.datasets.mini_weights()
     >>> weights.n_frames, len(weights.names)
     (1184, 51)
     """
@@ -121,7 +125,8 @@ def mini_reference(name: str = "M2_EU_04") -> Segments:
 
     Examples
     --------
-    >>> mini_reference().table["label"].tolist()
+    >>> import signface as sf
+    >>> sf.datasets.mini_reference().table["label"].tolist()
     ['N', 'ND', 'D', 'DN', 'N']
     """
     from signface.elan.reference import read_reference
@@ -136,13 +141,10 @@ def mini_examples() -> list[Example]:
     --------
     signface.solve_corpus : the same of any corpus, solved.
 
-    See Also
-    --------
-    signface.solve_corpus : the same of any corpus, solved.
-
     Examples
     --------
-    >>> [(example.signer, example.kind, len(example.stable)) for example in mini_examples()]
+    >>> import signface as sf
+    >>> [(example.signer, example.kind, len(example.stable)) for example in sf.datasets.mini_examples()]
     [('M1', 'IE', 5), ('M1', 'EU', 4), ('M2', 'SE', 5), ('M2', 'EU', 3)]
     """
     from signface.learn.examples import Example

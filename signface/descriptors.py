@@ -166,7 +166,9 @@ class Descriptors(TimedArrays, Content):
 
         Examples
         --------
-        >>> take = Descriptors(np.array([[0.0], [0.5]]), ("jawOpen",), rate=100)
+        >>> import numpy as np
+        >>> import signface as sf
+        >>> take = sf.Descriptors(np.array([[0.0], [0.5]]), ("jawOpen",), rate=100)
         >>> take.to_frame()["jawOpen"]
         time_s
         0.00    0.0

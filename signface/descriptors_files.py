@@ -208,9 +208,11 @@ def write_weights(descriptors: Descriptors, path: str | PathLike[str]) -> None:
 
     Examples
     --------
-    >>> take = Descriptors(np.array([[1 / 3], [0.5]]), ("jawOpen",), rate=100, history=("solved",))
-    >>> write_weights(take, "weights.parquet")
-    >>> read_weights("weights.parquet") == take
+    >>> import numpy as np
+    >>> import signface as sf
+    >>> take = sf.Descriptors(np.array([[1 / 3], [0.5]]), ("jawOpen",), rate=100, history=("solved",))
+    >>> sf.write_weights(take, "weights.parquet")
+    >>> sf.read_weights("weights.parquet") == take
     True
     """
     with WeightsWriter(path) as writer:

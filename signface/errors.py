@@ -45,7 +45,8 @@ class SignfaceError(Exception):
 
         Examples
         --------
-        >>> print(SignfaceError("is empty", hint="export it again").at("take.csv"))
+        >>> import signface as sf
+        >>> print(sf.SignfaceError("is empty", hint="export it again").at("take.csv"))
         take.csv: is empty. Export it again
         """
         return self if self.file is not None else type(self)(self.problem, file=file, hint=self.hint)
@@ -57,9 +58,10 @@ class SignfaceWarning(UserWarning):
     Examples
     --------
     >>> import warnings
+    >>> import signface as sf
     >>> with warnings.catch_warnings(record=True) as caught:
     ...     warnings.simplefilter("always")
-    ...     warnings.warn("two head markers were seen in one frame only", SignfaceWarning)
+    ...     warnings.warn("two head markers were seen in one frame only", sf.SignfaceWarning)
     >>> print(caught[0].message)
     two head markers were seen in one frame only
     """

@@ -191,7 +191,8 @@ class Signer:
 
     Examples
     --------
-    >>> Signer("Eva").name
+    >>> import signface as sf
+    >>> sf.Signer("Eva").name
     'Eva'
     """
 

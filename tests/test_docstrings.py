@@ -41,6 +41,15 @@ SLOW = {
 )
 def test_examples_run(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    found = doctest.testmod(importlib.import_module(name), optionflags=OPTIONS)
-    assert found.attempted
-    assert not found.failed
+    module = importlib.import_module(name)
+    runner = doctest.DocTestRunner(optionflags=OPTIONS)
+    for test in doctest.DocTestFinder().find(module):
+        if at_front_door(module, test.name.removeprefix(name).lstrip(".").partition(".")[0]):
+            test.globs = {"sf": sf}  # what a reader of that page has, who pastes the example
+        runner.run(test)
+    assert runner.tries
+    assert not runner.failures
+
+
+def at_front_door(module, name):
+    return module is sf.datasets or (bool(name) and name in sf.__all__ and getattr(sf, name) is getattr(module, name))

@@ -80,7 +80,7 @@ def solve_corpus(
     >>> from shutil import copytree
     >>> import signface as sf
     >>> corpus = sf.read_corpus(copytree(sf.datasets.mini_file().parent, "feel"))
-    >>> examples = solve_corpus(corpus.select(kinds=["EU"]), settings=sf.SolveSettings(alpha=0.3))
+    >>> examples = sf.solve_corpus(corpus.select(kinds=["EU"]), settings=sf.SolveSettings(alpha=0.3))
     >>> [(example.take, len(example.stable)) for example in examples]
     [('M1_EU_11', 4), ('M2_EU_04', 3)]
     """

@@ -86,7 +86,7 @@ def run_corpus(
     >>> from shutil import copytree
     >>> import signface as sf
     >>> corpus = sf.read_corpus(copytree(sf.datasets.mini_file().parent, "feel"))
-    >>> for outcome in run_corpus(corpus.select(kinds=["IE"]), workers=1):
+    >>> for outcome in sf.run_corpus(corpus.select(kinds=["IE"]), workers=1):
     ...     print(outcome.take, outcome.state)
     M1_IE_J done
     """

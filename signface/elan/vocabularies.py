@@ -48,9 +48,11 @@ def read_vocabulary(path: str | PathLike[str], *, tier: str | None = None, name:
 
     Examples
     --------
+    >>> from pathlib import Path
+    >>> import signface as sf
     >>> file = Path("brows.txt")
     >>> _ = file.write_text("raised\\teyebrows raised\\nlowered\\n")
-    >>> read_vocabulary(file).values
+    >>> sf.read_vocabulary(file).values
     ('raised', 'lowered')
     """
     file = Path(path)

@@ -164,7 +164,7 @@ def write_eaf(
     Examples
     --------
     >>> import signface as sf
-    >>> [file.name for file in write_eaf(sf.datasets.mini_reference(), "take.eaf", signer="Eva")]
+    >>> [file.name for file in sf.write_eaf(sf.datasets.mini_reference(), "take.eaf", signer="Eva")]
     ['take.eaf']
     """
     return prepare(

@@ -93,7 +93,7 @@ def evaluate(
     --------
     >>> import signface as sf
     >>> examples = sf.datasets.mini_examples()
-    >>> measured = evaluate(examples, classifiers=["knn1"], protocols=["across"])
+    >>> measured = sf.evaluate(examples, classifiers=["knn1"], protocols=["across"])
     >>> sorted(measured.metrics["classifiers"]["knn1"])
     ['automatic_segments', 'frames', 'manual_segments']
     """

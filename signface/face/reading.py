@@ -62,7 +62,8 @@ def read_face(name_or_path: str | PathLike[str] = "default", *, neutral: str | N
 
     Examples
     --------
-    >>> face = read_face("default")
+    >>> import signface as sf
+    >>> face = sf.read_face("default")
     >>> face.n_bases
     51
     """

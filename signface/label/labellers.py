@@ -55,7 +55,7 @@ def make_labeller(
     --------
     >>> import signface as sf
     >>> X, y, _, _ = sf.frame_table(sf.datasets.mini_examples())
-    >>> make_labeller("knn3").fit(X, y).predict(X[:1]).tolist()
+    >>> sf.make_labeller("knn3").fit(X, y).predict(X[:1]).tolist()
     ['N']
     """
     weight = "balanced" if balanced else None

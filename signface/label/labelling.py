@@ -151,7 +151,7 @@ def label_segments(
     --------
     >>> import signface as sf
     >>> weights = sf.datasets.mini_weights()
-    >>> labelled = label_segments(weights, sf.segment(weights), sf.load_model())
+    >>> labelled = sf.label_segments(weights, sf.segment(weights), sf.load_model())
     >>> labelled.table["label"].tolist()
     ['N', 'ND', 'D', 'DN', 'N']
     """

@@ -92,7 +92,9 @@ class Vocabulary:
 
     Examples
     --------
-    >>> brows = Vocabulary("brows", ("none", "raised", "lowered"), {"raised": "eyebrows raised"})
+    >>> import signface as sf
+    >>> from signface.label.vocabulary import AFFECT
+    >>> brows = sf.Vocabulary("brows", ("none", "raised", "lowered"), {"raised": "eyebrows raised"})
     >>> brows.rest, brows.describe("raised"), brows.describe("lowered")
     ('none', 'eyebrows raised', 'lowered')
     >>> AFFECT.join("N", "Sa"), AFFECT.split("NSa")
@@ -138,7 +140,9 @@ class Vocabulary:
 
         Examples
         --------
-        >>> Vocabulary.of(AFFECT.entries, "affect", AFFECT.description) == AFFECT
+        >>> import signface as sf
+        >>> from signface.label.vocabulary import AFFECT
+        >>> sf.Vocabulary.of(AFFECT.entries, "affect", AFFECT.description) == AFFECT
         True
         """
         listed = {entry.value: entry for entry in entries}
@@ -262,7 +266,8 @@ class Vocabulary:
 
         Examples
         --------
-        >>> brows = Vocabulary("brows", ("raised", "lowered")).with_blank()
+        >>> import signface as sf
+        >>> brows = sf.Vocabulary("brows", ("raised", "lowered")).with_blank()
         >>> brows.values, brows.allowed
         (('raised', 'lowered', 'none'), ('raised', 'lowered'))
         """
@@ -274,9 +279,11 @@ class Vocabulary:
 
         Examples
         --------
-        >>> Vocabulary.holding(["J", "N", "NJ"]) is AFFECT
+        >>> import signface as sf
+        >>> from signface.label.vocabulary import AFFECT
+        >>> sf.Vocabulary.holding(["J", "N", "NJ"]) is AFFECT
         True
-        >>> Vocabulary.holding(["raised", "lowered", "raised"]).values
+        >>> sf.Vocabulary.holding(["raised", "lowered", "raised"]).values
         ('lowered', 'raised')
         """
         distinct = {str(label) for label in labels}
@@ -319,7 +326,9 @@ class Vocabulary:
 
         Examples
         --------
-        >>> Vocabulary.from_dict(AFFECT.as_dict()) == AFFECT
+        >>> import signface as sf
+        >>> from signface.label.vocabulary import AFFECT
+        >>> sf.Vocabulary.from_dict(AFFECT.as_dict()) == AFFECT
         True
         """
         try:

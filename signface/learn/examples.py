@@ -251,7 +251,7 @@ def frame_table(
     --------
     >>> from sklearn.model_selection import LeaveOneGroupOut, cross_val_score
     >>> import signface as sf
-    >>> X, y, takes, signers = frame_table(sf.datasets.mini_examples())
+    >>> X, y, takes, signers = sf.frame_table(sf.datasets.mini_examples())
     >>> X.shape, len(set(y)), len(set(takes))
     ((272, 51), 5, 4)
     >>> len(cross_val_score(sf.make_labeller("knn3"), X, y, groups=signers, cv=LeaveOneGroupOut()))

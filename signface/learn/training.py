@@ -71,7 +71,7 @@ def train(
     --------
     >>> import signface as sf
     >>> examples = sf.datasets.mini_examples()
-    >>> model = train(examples, sf.TrainingSettings(classifier="knn3", calibrate=False))
+    >>> model = sf.train(examples, sf.TrainingSettings(classifier="knn3", calibrate=False))
     >>> model.card.labels
     ('A', 'D', 'J', 'N', 'Su')
     """

@@ -307,7 +307,7 @@ def agreement_table(
     >>> import signface as sf
     >>> reference, weights = sf.datasets.mini_reference(), sf.datasets.mini_weights()
     >>> automatic = sf.label_segments(weights, sf.segment(weights), sf.load_model())
-    >>> table = agreement_table({"reference": reference.table, "automatic": automatic.table})
+    >>> table = sf.agreement_table({"reference": reference.table, "automatic": automatic.table})
     >>> print(table[["annotators", "cohen_kappa", "modified_kappa"]].round(2))
                   annotators  cohen_kappa  modified_kappa
     0  reference / automatic         0.88            0.73

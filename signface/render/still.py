@@ -74,8 +74,8 @@ def draw_face(
 
     Examples
     --------
-    >>> from signface.face.reading import read_face
-    >>> draw_face(read_face("default"), size=(50, 60)).shape
+    >>> import signface as sf
+    >>> sf.draw_face(sf.read_face("default"), size=(50, 60)).shape
     (60, 50, 3)
     """
     mesh, colours = whole_mesh(face, weights)

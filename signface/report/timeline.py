@@ -56,7 +56,7 @@ def draw_timeline(
     --------
     >>> import signface as sf
     >>> weights = sf.datasets.mini_weights()
-    >>> figure = draw_timeline(weights, sf.segment(weights), reference=sf.datasets.mini_reference())
+    >>> figure = sf.draw_timeline(weights, sf.segment(weights), reference=sf.datasets.mini_reference())
     >>> figure.savefig("timeline.png")
     """
     from matplotlib.figure import Figure

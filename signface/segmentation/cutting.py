@@ -77,11 +77,11 @@ def segment(
     Examples
     --------
     >>> import numpy as np
-    >>> from signface.descriptors import Descriptors
+    >>> import signface as sf
     >>> time = np.arange(400) / 200
     >>> smile = np.clip((time - 0.8) / 0.4, 0, 1)
-    >>> take = Descriptors((3 * smile**2 - 2 * smile**3)[:, None], ("mouthSmileLeft",), rate=200)
-    >>> list(segment(take).table.kind)
+    >>> take = sf.Descriptors((3 * smile**2 - 2 * smile**3)[:, None], ("mouthSmileLeft",), rate=200)
+    >>> list(sf.segment(take).table.kind)
     ['stable', 'transition', 'stable']
     """
     if not (0 < prominence < 1 and 0 < extent < 1):

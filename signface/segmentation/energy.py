@@ -102,9 +102,9 @@ def energies(
     Examples
     --------
     >>> import numpy as np
-    >>> from signface.descriptors import Descriptors
+    >>> import signface as sf
     >>> ramp = np.linspace(0, 1, 101)[:, None]  # one base rising by 1 in a second
-    >>> curves = energies(Descriptors(ramp, ("jawOpen",), rate=100))
+    >>> curves = sf.energies(sf.Descriptors(ramp, ("jawOpen",), rate=100))
     >>> round(float(curves.velocity[50]), 6), round(float(curves.acceleration[50]), 6)
     (1.0, 0.0)
     """

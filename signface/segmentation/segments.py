@@ -101,8 +101,10 @@ class Segments(Content):
 
         Examples
         --------
+        >>> import pandas as pd
+        >>> import signface as sf
         >>> table = pd.DataFrame({"start_s": [0.0, 1.0], "end_s": [1.0, 3.0], "kind": ["stable", "transition"]})
-        >>> Segments(table).between(0.5, 2.0).table
+        >>> sf.Segments(table).between(0.5, 2.0).table
            start_s  end_s        kind
         0      0.5    1.0      stable
         1      1.0    2.0  transition

@@ -26,7 +26,8 @@ class EafOptions(Settings):
 
     Examples
     --------
-    >>> EafOptions(doubtful=0.5).chosen
+    >>> import signface as sf
+    >>> sf.EafOptions(doubtful=0.5).chosen
     {'doubtful': 0.5}
     """
 

@@ -46,9 +46,10 @@ def read_settings(path: str | PathLike[str], usual: Laboratory | None = None) ->
     --------
     >>> from pathlib import Path
     >>> from tempfile import mkdtemp
+    >>> import signface as sf
     >>> file = Path(mkdtemp()) / "lab.toml"
     >>> _ = file.write_text("[solve]\\nalpha = 0.3\\n")
-    >>> read_settings(file).solve.alpha
+    >>> sf.read_settings(file).solve.alpha
     0.3
     """
     file = Path(path)

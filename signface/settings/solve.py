@@ -43,10 +43,11 @@ class SolveSettings(Settings):
 
     Examples
     --------
-    >>> settings = SolveSettings(alpha=0.3)
+    >>> import signface as sf
+    >>> settings = sf.SolveSettings(alpha=0.3)
     >>> settings.chosen
     {'alpha': 0.3}
-    >>> SolveSettings.from_dict(settings.as_dict()) == settings
+    >>> sf.SolveSettings.from_dict(settings.as_dict()) == settings
     True
     """
 
@@ -141,7 +142,8 @@ class SolveSettings(Settings):
 
         Examples
         --------
-        >>> SolveSettings(alpha=0.3).differences(SolveSettings().as_dict())
+        >>> import signface as sf
+        >>> sf.SolveSettings(alpha=0.3).differences(sf.SolveSettings().as_dict())
         ['alpha 0.3 instead of the usual']
         """
         takes_own = ("face", "layout", "neutral")

@@ -29,7 +29,8 @@ class TrainingSettings(Settings):
 
     Examples
     --------
-    >>> TrainingSettings(classifier="knn3", normalise="signer").chosen
+    >>> import signface as sf
+    >>> sf.TrainingSettings(classifier="knn3", normalise="signer").chosen
     {'classifier': 'knn3', 'normalise': 'signer'}
     """
 
@@ -85,7 +86,8 @@ class TrainingSettings(Settings):
 
         Examples
         --------
-        >>> TrainingSettings(features=("windows",)).for_classifier("hmm").features
+        >>> import signface as sf
+        >>> sf.TrainingSettings(features=("windows",)).for_classifier("hmm").features
         ('weights',)
         """
         return self.changed(classifier=name, features=("weights",) if name in SEQUENCE_NAMES else self.features)

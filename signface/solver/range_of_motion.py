@@ -103,6 +103,7 @@ def calibrate_signer(
     --------
     >>> import numpy as np
     >>> import signface as sf
+    >>> from signface.solver.range_of_motion import Shown
     >>> face = sf.read_face()
     >>> layout = sf.read_layout("default-40", face)
     >>> weights = np.zeros((100, face.n_bases))  # two seconds at 50 Hz: the jaw opens and closes

@@ -85,7 +85,7 @@ def solve(
     Examples
     --------
     >>> import signface as sf
-    >>> solve(sf.datasets.mini_take("M1_IE_J")).weights.shape
+    >>> sf.solve(sf.datasets.mini_take("M1_IE_J")).weights.shape
     (2149, 51)
     """
     pieces = solve_pieces(
@@ -133,7 +133,7 @@ def solve_pieces(
     --------
     >>> import signface as sf
     >>> recording = sf.open_recording(sf.datasets.mini_file())
-    >>> [part.n_frames for part in solve_pieces(recording, piece=500)]
+    >>> [part.n_frames for part in sf.solve_pieces(recording, piece=500)]
     [500, 500, 184]
     """
     if isinstance(recording, Descriptors):

@@ -111,7 +111,9 @@ class Take(TimedArrays, Content):
 
         Examples
         --------
-        >>> take = Take(np.arange(6.0).reshape(2, 1, 3), ("CHIN",), rate=100)
+        >>> import numpy as np
+        >>> import signface as sf
+        >>> take = sf.Take(np.arange(6.0).reshape(2, 1, 3), ("CHIN",), rate=100)
         >>> take.to_frame()
                 CHIN_x  CHIN_y  CHIN_z
         time_s

@@ -74,7 +74,7 @@ def write_report(
     >>> import signface as sf
     >>> examples = sf.datasets.mini_examples()
     >>> measured = sf.evaluate(examples, classifiers=["knn1"], protocols=["across"])
-    >>> write_report(measured, examples, sf.datasets.mini_corpus(), "report").name
+    >>> sf.write_report(measured, examples, sf.datasets.mini_corpus(), "report").name
     'report.html'
     """
     settings = settings or SolveSettings()
