@@ -1,6 +1,6 @@
 """Files read and written, whole or not at all, and the folder of data that ships with signface.
 
-- `whole_file`: write beside the target, then rename over it.
+- `whole_file`: write beside the target, then rename over it; `write_text`: a text so.
 - `reading`: what goes wrong where a file is read, as an error that names it.
 - `DATA`, `models_folder`, `shipped`, `bundled_corpus`: where the data live that ship.
 """
@@ -73,6 +73,12 @@ def whole_file(
         temporary.replace(target)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def write_text(path: str | PathLike[str], text: str) -> None:
+    """Write a text (UTF-8), whole or not at all; errors are those of `whole_file`."""
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 @contextlib.contextmanager

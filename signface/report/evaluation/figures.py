@@ -18,7 +18,7 @@ import pandas as pd
 from signface.descriptors import Descriptors
 from signface.label.vocabulary import Vocabulary
 from signface.report.evaluation.tables import PROTOCOL_TITLES, SECTIONS
-from signface.report.style import COLOURS, MARKS, styled
+from signface.report.style import COLOURS, MARKS, look, new_figure, short_name, styled
 from signface.report.timeline import draw_rows_on
 from signface.segmentation.segments import Segments
 
@@ -35,9 +35,6 @@ CURVE_RATE = 40.0
 #: Segments that a share must be counted from to be drawn.
 LEAST_BIN = 5
 
-#: Letters of a name that figures have room for.
-LONGEST_NAME = 18
-
 
 def draw_accuracy(protocols: Mapping[str, Mapping[str, Mapping]]) -> Figure:
     """Accuracy of each classifier on manual and automatic segments, one panel for each protocol.
@@ -52,7 +49,7 @@ def draw_accuracy(protocols: Mapping[str, Mapping[str, Mapping]]) -> Figure:
     """
     with styled():
         bars = max(len(classifiers) for classifiers in protocols.values())
-        figure = _figure(max(3.6, 0.75 + 0.82 * bars) * len(protocols) + 0.4, 3.7)
+        figure = new_figure(max(3.6, 0.75 + 0.82 * bars) * len(protocols) + 0.4, 3.7)
         panels = figure.subplots(1, len(protocols), squeeze=False, sharey=True)[0]
         for panel, (protocol, classifiers) in zip(panels, protocols.items(), strict=True):
             _accuracy_panel(panel, classifiers)
@@ -72,12 +69,10 @@ def _accuracy_panel(panel: Axes, classifiers: Mapping[str, Mapping]) -> None:
     for number, (section, (colour, hatch)) in enumerate(BARS.items()):
         scores = [classifiers[name][section] for name in names]
         accuracy = np.array([_float(scored["accuracy"]) for scored in scores])
-        place = np.arange(len(names)) + 0.38 * (number - 0.5)
-        title = {"manual_segments": "manual segments", "automatic_segments": "automatic segments"}[section]
-        panel.bar(
-            place, accuracy.tolist(), width=0.36, color=colour, hatch=hatch, edgecolor="white", linewidth=0, label=title
-        )
-        for at, scored, value in zip(place, scores, accuracy, strict=True):
+        centres = np.arange(len(names)) + 0.38 * (number - 0.5)
+        style = {"color": colour, "hatch": hatch, "edgecolor": "white", "linewidth": 0}
+        panel.bar(centres, accuracy.tolist(), 0.36, label=SECTIONS[section], **style)  # type: ignore[arg-type]
+        for at, scored, value in zip(centres, scores, accuracy, strict=True):
             low, high = scored.get("accuracy_interval") or (value, value)
             if low < high:
                 panel.plot([at, at], [low, high], color="#222222", linewidth=1)
@@ -86,17 +81,11 @@ def _accuracy_panel(panel: Axes, classifiers: Mapping[str, Mapping]) -> None:
                     f"{value:.2f}", (at, max(high, value)), (0, 2), textcoords="offset points", ha="center", fontsize=8
                 )
         majority = [_float(scored["majority"]) for scored in scores]
-        panel.hlines(
-            majority,
-            place - 0.18,
-            place + 0.18,
-            color="#a51d2d",
-            linewidth=1.8,
-            label="always the most frequent label" if number == 0 else "_",
-        )
+        label = "_" if number else "always the most frequent label"
+        panel.hlines(majority, centres - 0.18, centres + 0.18, color="#a51d2d", linewidth=1.8, label=label)
     chance = scores[0]["chance"]
     panel.axhline(chance, color="#444444", linewidth=1, linestyle=":", label="chance (one label in all)")
-    panel.set_xticks(range(len(names)), [_short(name) for name in names])
+    panel.set_xticks(range(len(names)), [short_name(name) for name in names])
     panel.set_xlim(-0.6, len(names) - 0.4)
     panel.set_ylim(0, 1.05)
     panel.set_yticks(np.arange(0, 1.01, 0.2))
@@ -115,7 +104,7 @@ def draw_segmentation(table: pd.DataFrame) -> Figure:
     with styled():
         kinds = list(dict.fromkeys(table["kind"]))
         methods = list(dict.fromkeys(_method(row) for row in table.to_dict("records")))
-        figure = _figure(2.6 + 2.2 * len(kinds), 1.3 + 0.28 * len(methods))
+        figure = new_figure(2.6 + 2.2 * len(kinds), 1.3 + 0.28 * len(methods))
         panels = figure.subplots(1, len(kinds), squeeze=False, sharey=True)[0]
         tolerances = [column for column in table.columns if column.startswith("boundary F1")]
         for panel, kind in zip(panels, kinds, strict=True):
@@ -141,7 +130,7 @@ def draw_segmentation(table: pd.DataFrame) -> Figure:
 def _method(row: Mapping[str, Any]) -> str:
     """Name of a row of the segmentation's table."""
     tested_on = {"within": "same signer", "across": "other signers"}.get(row["protocol"], "")
-    return f"{_short(row['method'])}, {tested_on}" if tested_on else _short(row["method"])
+    return f"{short_name(row['method'])}, {tested_on}" if tested_on else short_name(row["method"])
 
 
 def draw_confusions(sections: Mapping[str, Mapping], *, columns: int = 3) -> Figure:
@@ -156,7 +145,7 @@ def draw_confusions(sections: Mapping[str, Mapping], *, columns: int = 3) -> Fig
         columns = min(columns, len(sections))
         lines = -(-len(sections) // columns)
         size = 0.34 * max(len(scores["labels"]) for scores in sections.values())
-        figure = _figure(columns * (size + 0.75), lines * (size + 1.05))
+        figure = new_figure(columns * (size + 0.75), lines * (size + 1.05))
         axes = figure.subplots(lines, columns, squeeze=False).ravel()
         for panel, (title, scores) in zip(axes, sections.items()):
             counts = np.array(scores["confusion"], dtype=float)
@@ -196,23 +185,15 @@ def draw_learning_curve(table: pd.DataFrame) -> Figure:
     """
     with styled():
         protocols = list(dict.fromkeys(table["protocol"]))
-        figure = _figure(0.6 + 4.1 * len(protocols), 3.5)
+        figure = new_figure(0.6 + 4.1 * len(protocols), 3.5)
         panels = figure.subplots(1, len(protocols), squeeze=False, sharey=True)[0]
         for panel, protocol in zip(panels, protocols, strict=True):
             part = table[table["protocol"] == protocol]
             for number, name in enumerate(dict.fromkeys(part["classifier"])):
                 drawn = part[part["classifier"] == name].groupby("size")["accuracy"].agg(["mean", "min", "max"])
-                colour = COLOURS[number % len(COLOURS)]
-                panel.fill_between(drawn.index, drawn["min"], drawn["max"], color=colour, alpha=0.12, linewidth=0)
-                panel.plot(
-                    drawn.index,
-                    drawn["mean"],
-                    MARKS[number % len(MARKS)] + "-",
-                    color=colour,
-                    linewidth=1.4,
-                    markersize=4.5,
-                    label=_short(name),
-                )
+                style = look(number, "-")
+                panel.fill_between(drawn.index, drawn["min"], drawn["max"], color=style["color"], alpha=0.12, lw=0)
+                panel.plot(drawn.index, drawn["mean"], **style, lw=1.4, markersize=4.5, label=short_name(name))
             panel.set_title(PROTOCOL_TITLES.get(protocol, protocol))
             panel.set_xticks(sorted(set(part["size"])))
             panel.set_xlabel("training " + part["by"].iloc[0] + (" of each signer" if protocol == "within" else ""))
@@ -245,7 +226,7 @@ def draw_take(
         Gives the labels their colours.
     """
     with styled():
-        figure = _figure(9.4, 2.0 + 0.28 * len(rows))
+        figure = new_figure(9.4, 2.0 + 0.28 * len(rows))
         draw_rows_on(figure, descriptors, rows, title="", rate=CURVE_RATE, marks=marks, vocabulary=vocabulary)
         return figure
 
@@ -259,19 +240,13 @@ def draw_reliability(curves: Mapping[str, Sequence[Mapping[str, float]]]) -> Fig
         Title to bins, each with `confidence`, `accuracy` and `n`.
     """
     with styled():
-        figure = _figure(5.0, 3.5)
+        figure = new_figure(5.0, 3.5)
         panel = figure.subplots()
         panel.plot([0, 1], [0, 1], color="#999999", linewidth=1, linestyle="--")
         for number, (name, bins) in enumerate(curves.items()):
             kept = [share for share in bins if share["n"] >= LEAST_BIN]
-            panel.plot(
-                [share["confidence"] for share in kept],
-                [share["accuracy"] for share in kept],
-                MARKS[number % len(MARKS)] + "-",
-                color=COLOURS[number % len(COLOURS)],
-                markersize=5,
-                label=_short(name),
-            )
+            confidence, accuracy = ([share[key] for share in kept] for key in ("confidence", "accuracy"))
+            panel.plot(confidence, accuracy, **look(number, "-"), markersize=5, label=short_name(name))
         panel.set(xlim=(0, 1), ylim=(0, 1.02), xlabel="confidence", ylabel="share right")
         panel.grid(True)
         panel.set_aspect("equal")
@@ -282,7 +257,7 @@ def draw_reliability(curves: Mapping[str, Sequence[Mapping[str, float]]]) -> Fig
 def section_titles(classifiers: Mapping[str, Mapping], section: str) -> dict[str, Mapping]:
     """Panels of `draw_confusions`: each classifier's scores of a section, with the accuracy beside the name."""
     return {
-        f"{_short(name)}, {_float(sections[section]['accuracy']):.2f}": sections[section]
+        f"{short_name(name)}, {_float(sections[section]['accuracy']):.2f}": sections[section]
         for name, sections in classifiers.items()
         if section in SECTIONS and sections[section]["n"]
     }
@@ -290,15 +265,3 @@ def section_titles(classifiers: Mapping[str, Mapping], section: str) -> dict[str
 
 def _float(value: float | None) -> float:
     return float("nan") if value is None else float(value)
-
-
-def _short(name: str) -> str:
-    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1]}…"
-
-
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    figure.get_layout_engine().set(h_pad=0.06, w_pad=0.06)  # type: ignore[union-attr, call-arg]
-    return figure

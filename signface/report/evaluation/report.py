@@ -7,9 +7,12 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Sequence
+from functools import cache
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -18,7 +21,7 @@ from signface.corpus.facts import corpus_facts
 from signface.corpus.manifest import Corpus
 from signface.evaluation.measure import Measured
 from signface.face.reading import read_face
-from signface.files import whole_file
+from signface.files import whole_file, write_text
 from signface.learn.examples import Example
 from signface.metrics.segmentation import match_boundaries
 from signface.report.evaluation import figures, tables
@@ -28,6 +31,9 @@ from signface.report.evaluation.page import evaluation_page
 from signface.report.evaluation.worst_takes import FAR_S, TakeVerdict
 from signface.report.figure_files import save_vector
 from signface.settings.solve import SolveSettings
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def write_report(
@@ -86,17 +92,14 @@ def write_report(
 
 def write_files(evaluated: Evaluated, folder: Path) -> Path:
     """Write all files of a report, and give its page; see `write_report`."""
-    with whole_file(folder / "metrics.json") as temporary:
-        text = json.dumps(evaluated.metrics, indent=1, ensure_ascii=False) + "\n"
-        temporary.write_text(text, encoding="utf-8")
+    write_text(folder / "metrics.json", json.dumps(evaluated.metrics, indent=1, ensure_ascii=False) + "\n")
     drawn = draw_all(evaluated)
     for figure in [figure for section in drawn.values() for figure in section]:
         save_vector(figure.figure, figure.svg, folder / "figures", figure.name)
     for name, table in files(evaluated).items():
         with whole_file(folder / f"{name}.csv") as temporary:
             table.to_csv(temporary, index=False, lineterminator="\n")
-    with whole_file(folder / "report.html") as temporary:
-        temporary.write_text(evaluation_page(evaluated, drawn), encoding="utf-8")
+    write_text(folder / "report.html", evaluation_page(evaluated, drawn))
     return folder / "report.html"
 
 
@@ -133,89 +136,50 @@ def files(evaluated: Evaluated) -> dict[str, pd.DataFrame]:
 def draw_all(evaluated: Evaluated) -> dict[str, list[Drawn]]:
     """Section of the page to its figures."""
     metrics, parts = evaluated.metrics, evaluated.parts
-    classifiers = {protocol: part["classifiers"] for protocol, part in parts.items()}
+    titles = {protocol: tables.PROTOCOL_TITLES[protocol] for protocol in parts}
     main = next(iter(parts))
+    segmentation = tables.segmentation_table(metrics["segmentation_by_kind"])
     drawn: dict[str, list[Drawn]] = {
-        "accuracy": [
-            Drawn(
-                "accuracy",
-                figures.draw_accuracy(classifiers),
-                "Bars: accuracy of each classifier on manual and automatic segments; the table below has the numbers.",
-                "Share of segments with the reference’s label (figure 4.4 of the thesis). Whiskers: 95 % of what other "
-                "draws of whole takes give.",
-            )
-        ],
-        "segmentation": [
-            Drawn(
-                "segmentation",
-                figures.draw_segmentation(tables.segmentation_table(metrics["segmentation_by_kind"])),
-                "Boundary F1 of each method and kind of take at three tolerances; the table below has the numbers.",
-                "Boundaries found within three distances of one of the reference. The energies learn nothing and are "
-                "shown on every kind; the others on what they were tested on, after labelling, when neighbours of "
-                "one label have become one segment.",
-            )
-        ],
+        "accuracy": [_drawn("accuracy", figures.draw_accuracy({key: parts[key]["classifiers"] for key in parts}))],
+        "segmentation": [_drawn("segmentation", figures.draw_segmentation(segmentation))],
         "confusions": [],
         "confidence": [],
         "curve": [],
         "importance": [],
     }
-    for protocol in parts:
-        panels = figures.section_titles(classifiers[protocol], "automatic_segments")
+    for protocol, part in parts.items():
+        panels = figures.section_titles(part["classifiers"], "automatic_segments")
         if panels:
-            drawn["confusions"].append(
-                Drawn(
-                    f"confusions_{protocol}",
-                    figures.draw_confusions(panels),
-                    f"Confusion matrices on automatic segments, {tables.PROTOCOL_TITLES[protocol]}; the tables below "
-                    "have the numbers.",
-                    f"Automatic segments, {tables.PROTOCOL_TITLES[protocol]}: how many of each label of the reference "
-                    "(rows) were called what (columns). The darker, the larger the share of the row. Above each: the "
-                    "classifier and its accuracy.",
-                )
-            )
+            figure = figures.draw_confusions(panels)
+            drawn["confusions"].append(_drawn("confusions", figure, f"_{protocol}", protocol=titles[protocol]))
     curves = {name: bins for name, bins in metrics["reliability"].get(main, {}).items() if bins}
     if curves:
-        drawn["confidence"].append(
-            Drawn(
-                "reliability",
-                figures.draw_reliability(curves),
-                "Lines: share of automatic segments that are right, against the confidence of the classifier.",
-                f"Share of automatic segments that are right against their confidence, {tables.PROTOCOL_TITLES[main]}. "
-                "On the dashed line a confidence means what it says; below it, it promises too much. "
-                f"Shares of fewer than {figures.LEAST_BIN} segments are not drawn.",
-            )
-        )
+        figure = figures.draw_reliability(curves)
+        drawn["confidence"].append(_drawn("reliability", figure, protocol=titles[main], least=str(figures.LEAST_BIN)))
     points = [
         pd.DataFrame(curve).assign(protocol=protocol) for protocol, curve in metrics["learning_curve"].items() if curve
     ]
     if points:
-        drawn["curve"].append(
-            Drawn(
-                "learning_curve",
-                figures.draw_learning_curve(pd.concat(points, ignore_index=True)),
-                "Lines: accuracy on manual segments against the number of training takes or signers; the table below "
-                "has the numbers.",
-                "Accuracy on the annotator’s segments against what was trained on, mean over random orders; bands: the "
-                "least and the most of them. The last point is everything. The vertical axis is cut.",
-            )
-        )
+        figure = figures.draw_learning_curve(pd.concat(points, ignore_index=True))
+        drawn["curve"].append(_drawn("learning_curve", figure))
     name = evaluated.best if evaluated.best in metrics["importance"] else next(iter(metrics["importance"]), None)
     if name:
-        drawn["importance"].append(
-            Drawn(
-                "importance",
-                draw_importance(pd.DataFrame(metrics["importance"][name]), evaluated.face, title=name),
-                f"Bars: accuracy that {name} loses without each base, and the face painted with it; the table below "
-                "has the numbers.",
-                f"What “{name}” ({tables.PROTOCOL_TITLES[main]}) loses when a base is dealt out anew among the "
-                "segments of the test takes, left and right together. Whiskers: 95 % of other draws of takes. The skin "
-                "is painted with the sum over the bases, each by how far it moves the skin.",
-            )
-        )
+        figure = draw_importance(pd.DataFrame(metrics["importance"][name]), evaluated.face, title=name)
+        drawn["importance"].append(_drawn("importance", figure, classifier=name, protocol=titles[main]))
     drawn["worst"] = [_take(evaluated, verdict) for verdict in evaluated.worst if _drawable(evaluated, verdict)]
     drawn["gallery"] = [_take(evaluated, verdict) for verdict in evaluated.gallery if _drawable(evaluated, verdict)]
     return drawn
+
+
+@cache
+def _captions() -> dict[str, dict[str, str]]:
+    return tomllib.loads(Path(__file__).with_name("captions.toml").read_text(encoding="utf-8"))
+
+
+def _drawn(key: str, figure: Figure, ending: str = "", **values: str) -> Drawn:
+    """A figure with its words of `captions.toml`."""
+    words = _captions()[key]
+    return Drawn(key + ending, figure, words["description"].format(**values), words["caption"].format(**values))
 
 
 def _drawable(evaluated: Evaluated, verdict: TakeVerdict) -> bool:

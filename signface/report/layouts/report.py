@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from signface.face.layout_files import write_layout
-from signface.files import whole_file
+from signface.files import whole_file, write_text
 from signface.placement.choosing import METHODS, Material, unseen_words
 from signface.placement.comparison import Comparison, summarise
 from signface.placement.empirical import EMPIRICAL
@@ -70,8 +70,7 @@ def write_report(comparison: Comparison, folder: str | PathLike[str]) -> Path:
         distances(layout, face).to_csv(temporary, index=False)
     sheets = [folder / f"{layout.name}-sheet.{ending}" for ending in ("pdf", "svg", "png")]
     draw_sheet(face, layout, *sheets, note=f"Chosen by: {METHODS[comparison.method]}.")
-    with whole_file(folder / "report.html") as temporary:
-        temporary.write_text(comparison_page(comparison), encoding="utf-8")
+    write_text(folder / "report.html", comparison_page(comparison))
     return folder / "report.html"
 
 

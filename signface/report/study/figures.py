@@ -13,18 +13,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from signface.report.figure_files import svg_element
-from signface.report.style import COLOURS, MARKS, styled
+from signface.report.style import COLOURS, LONGEST_NAME, look, new_figure, short_name, styled
 from signface.study.responses import LIKERT, Responses
 from signface.study.statistics.intervals import participant_interval
 from signface.study.statistics.tables import StudyTable
 from signface.study.statistics.thesis_tables import confusions
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Letters of a method's name that figures have room for.
-LONGEST_NAME = 18
+#: Inches between panels, across and down.
+PADDING = (0.08, 0.1)
 
 
 def means_figure(responses: Responses, *, resamples: int, seed: int) -> str:
@@ -43,33 +42,20 @@ def means_figure(responses: Responses, *, resamples: int, seed: int) -> str:
     """
     questions, methods = responses.questions, responses.methods
     with styled():
-        figure = _figure(2.3 * len(questions) + 0.4, 2.9)
-        for place, (column, name) in enumerate(questions.items(), start=1):
-            axes = figure.add_subplot(1, len(questions), place)
+        figure = new_figure(2.3 * len(questions) + 0.4, 2.9, padding=PADDING)
+        for number, (column, name) in enumerate(questions.items(), start=1):
+            axes = figure.add_subplot(1, len(questions), number)
             for row, method in enumerate(methods):
                 answers = responses.table[responses.table["method"] == method]
                 mean, low, high = participant_interval(answers, column, resamples=resamples, seed=seed)
-                axes.errorbar(
-                    row,
-                    mean,
-                    [[mean - low], [high - mean]],
-                    fmt=MARKS[row % len(MARKS)],
-                    color=COLOURS[row % len(COLOURS)],
-                    capsize=4,
-                    markersize=7,
-                    linewidth=1.8,
-                )
-                axes.annotate(
-                    f"{mean:.2f}",
-                    (row, mean),
-                    (9, 0),
-                    textcoords="offset points",
-                    va="center",
-                    fontsize=8.5,
-                    color="#333333",
-                )
+                bars = [[mean - low], [high - mean]]
+                axes.errorbar(row, mean, bars, **look(row), capsize=4, markersize=7, elinewidth=1.8)
+                beside = axes.annotate(f"{mean:.2f}", (row, mean), (9, 0), textcoords="offset points", va="center")
+                beside.set(fontsize=8.5, color="#333333")
             axes.set_title(name)
-            axes.set_xticks(range(len(methods)), map(_short, methods), rotation=30 if max(map(len, methods)) > 5 else 0)
+            axes.set_xticks(
+                range(len(methods)), map(short_name, methods), rotation=30 if max(map(len, methods)) > 5 else 0
+            )
             axes.set_xlim(-0.6, len(methods) - 0.2)
             axes.yaxis.grid(True)
             axes.set_ylabel("share recognised" if column == "correct" else "mean answer, 1 to 7")
@@ -92,30 +78,21 @@ def differences_figure(responses: Responses, contrasts: StudyTable, models: Stud
     with styled():
         pairs = list(dict.fromkeys(contrasts.frame["", "pair"]))  # a question may not have been asked for every method
         longest = min(2 * LONGEST_NAME + 3, max(map(len, pairs)))
-        figure = _figure(1.9 * len(questions) + 0.085 * longest + 1.2, 0.42 * len(pairs) + 1.1)
+        figure = new_figure(1.9 * len(questions) + 0.085 * longest + 1.2, 0.42 * len(pairs) + 1.1, padding=PADDING)
         panels = figure.subplots(1, len(questions), squeeze=False, sharey=True)[0]
         for axes, name in zip(panels, questions.values()):
             of_question = contrasts.frame[contrasts.frame["", "question"] == name]
-            whole = (
-                models.frame.loc[models.frame["", "question"] == name, [("mixed model", "p (Holm)")]].to_numpy().min()
-            )
+            whole = models.frame["mixed model", "p (Holm)"][models.frame["", "question"] == name].min()
             for _, contrast in of_question.iterrows():
                 row = pairs.index(contrast["", "pair"])
                 value, low, high = (contrast["difference of means", part] for part in ("first − second", "low", "high"))
                 significant = whole < alpha and contrast["mixed model", "p (Holm)"] < alpha
-                axes.errorbar(
-                    value,
-                    row,
-                    xerr=[[max(0.0, value - low)], [max(0.0, high - value)]],
-                    fmt="o",
-                    color=COLOURS[0],
-                    markerfacecolor=COLOURS[0] if significant else "white",
-                    capsize=3.5,
-                    linewidth=1.8,
-                )
+                bars = [[max(0.0, value - low)], [max(0.0, high - value)]]
+                filling = COLOURS[0] if significant else "white"
+                axes.errorbar(value, row, xerr=bars, **look(0), markerfacecolor=filling, capsize=3.5, elinewidth=1.8)
             axes.axvline(0, color="#888888", linewidth=1)
             axes.set_title(name)
-            axes.set_yticks(range(len(pairs)), [" – ".join(map(_short, pair.split(" – "))) for pair in pairs])
+            axes.set_yticks(range(len(pairs)), [" – ".join(map(short_name, pair.split(" – "))) for pair in pairs])
             axes.set_ylim(len(pairs) - 0.5, -0.5)
             axes.xaxis.grid(True)
             axes.set_xlabel("shares" if name == questions.get("correct") else "points")
@@ -134,9 +111,9 @@ def confusion_figure(responses: Responses) -> str:
         lines = -(-len(matrices) // columns)
         first = next(iter(matrices.values()))
         size = max(2.6, 0.46 * len(first.columns))
-        figure = _figure(columns * (size + 0.5) + 0.3, lines * (size + 1.1))
-        for place, (method, counts) in enumerate(matrices.items(), start=1):
-            axes = figure.add_subplot(lines, columns, place)
+        figure = new_figure(columns * (size + 0.5) + 0.3, lines * (size + 1.1), padding=PADDING)
+        for number, (method, counts) in enumerate(matrices.items(), start=1):
+            axes = figure.add_subplot(lines, columns, number)
             totals = counts.sum(axis=1).to_numpy()[:, None]
             shares = np.divide(counts.to_numpy(float), totals, out=np.zeros(counts.shape), where=totals > 0)
             edges = [np.arange(size + 1) - 0.5 for size in shares.shape[::-1]]
@@ -145,20 +122,13 @@ def confusion_figure(responses: Responses) -> str:
             axes.invert_yaxis()
             for row, column in np.ndindex(shares.shape):
                 share = shares[row, column]
-                axes.text(
-                    column,
-                    row,
-                    f"{100 * share:.0f}",
-                    ha="center",
-                    va="center",
-                    fontsize=8.5,
-                    color="white" if share > 0.55 else "#333333" if share >= 0.1 else "#999999",
-                )
+                ink = "white" if share > 0.55 else "#333333" if share >= 0.1 else "#999999"
+                axes.text(column, row, f"{100 * share:.0f}", ha="center", va="center", fontsize=8.5, color=ink)
             axes.set_xticks(range(len(counts.columns)), counts.columns, rotation=_rotation(counts.columns))
             axes.set_yticks(range(len(counts.index)), counts.index)
-            axes.set_title(_short(method))
+            axes.set_title(short_name(method))
             axes.set_xlabel("answered")
-            if (place - 1) % columns == 0:
+            if (number - 1) % columns == 0:
                 axes.set_ylabel("played")
             axes.tick_params(length=0)
             axes.spines[:].set_visible(False)
@@ -172,22 +142,18 @@ def expressions_figure(responses: Responses) -> str:
     with styled():
         columns = 2 if len(questions) in (2, 4) else min(3, len(questions))
         lines = -(-len(questions) // columns)
-        figure = _figure(9.6 if columns > 1 else 4.8, 2.5 * lines + 0.5)
-        for place, (column, name) in enumerate(questions.items(), start=1):
-            axes = figure.add_subplot(lines, columns, place)
+        figure = new_figure(9.6 if columns > 1 else 4.8, 2.5 * lines + 0.5, padding=PADDING)
+        for number, (column, name) in enumerate(questions.items(), start=1):
+            axes = figure.add_subplot(lines, columns, number)
             means = responses.table.groupby(["method", "expression"])[column].mean()
             for row, method in enumerate(methods):
                 values = [means.get((method, expression), np.nan) for expression in expressions]
                 shift = (row - (len(methods) - 1) / 2) * 0.16
                 axes.plot(
-                    np.arange(len(expressions)) + shift,
-                    values,
-                    MARKS[row % len(MARKS)],
-                    color=COLOURS[row % len(COLOURS)],
-                    markersize=6,
-                    label=_short(method),
+                    np.arange(len(expressions)) + shift, values, **look(row), markersize=6, label=short_name(method)
                 )
-            _between(axes, len(expressions))
+            for edge in np.arange(len(expressions) - 1) + 0.5:
+                axes.axvline(edge, color="#eeeeee", linewidth=1)
             axes.set_title(name)
             axes.set_xticks(range(len(expressions)), expressions, rotation=_rotation(expressions))
             axes.set_ylim((0, 1.02) if column == "correct" else (LIKERT[0] - 0.1, LIKERT[1] + 0.1))
@@ -201,31 +167,12 @@ def expressions_figure(responses: Responses) -> str:
         return svg_element(figure, "expressions", "Means by played expression and method")
 
 
-def _short(name: str) -> str:
-    """A method's name as a figure has room for it."""
-    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1]}…"
-
-
-def _between(axes: Axes, count: int) -> None:
-    for edge in np.arange(count - 1) + 0.5:
-        axes.axvline(edge, color="#eeeeee", linewidth=1)
-
-
 def _rotation(labels: Sequence[str]) -> int:
     return 45 if max(len(str(label)) for label in labels) > 4 else 0
-
-
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    figure.get_layout_engine().set(h_pad=0.1, w_pad=0.08)  # type: ignore[union-attr, call-arg]
-    return figure
 
 
 def _mark(figure: Figure, responses: Responses) -> None:
     """A figure of simulated answers says so itself, wherever it is pasted."""
     if responses.simulated:
-        figure.text(
-            0.5, 0.5, "SIMULATED", fontsize=44, color="#b00020", alpha=0.09, ha="center", va="center", rotation=18
-        )
+        mark = figure.text(0.5, 0.5, "SIMULATED", ha="center", va="center")
+        mark.set(fontsize=44, color="#b00020", alpha=0.09, rotation=18)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from signface.errors import SignfaceError
-from signface.files import whole_file
+from signface.files import whole_file, write_text
 from signface.label.vocabulary import AFFECT
 from signface.report.pages import render_page
 from signface.report.study.figures import confusion_figure, differences_figure, expressions_figure, means_figure
@@ -40,6 +40,17 @@ SHORT = {
     "interactions": "Interactions",
     "expressions": "Expressions",
     "participants": "Participants",
+}
+
+CAPTIONS = {
+    "means_by_method": "Means by method. Bars: 95 % bootstrap intervals over participants. The vertical axes are cut "
+    "to show differences; compare the numbers, not the heights. The bars hold what differs between participants; two "
+    "methods may differ although their bars overlap, since the same participants saw both.",
+    "differences": "Differences between methods, with 95 % bootstrap intervals over participants. Filled: shown by the "
+    "mixed model with Holm's correction, for the question and for its pairs.",
+    "confusion": "Confusion matrices: of all answers to films of an expression, the per cent that named "
+    "each expression.",
+    "means_by_expression": "Means by played expression and method.",
 }
 
 
@@ -88,13 +99,10 @@ def write_report(
         name = _file_name(table.key, taken)
         with whole_file(folder / "tables" / f"{name}.csv") as path:
             frame.to_csv(path, index=False)
-        with whole_file(folder / "tables" / f"{name}.tex") as path:
-            path.write_text(as_latex(table), encoding="utf-8")
+        write_text(folder / "tables" / f"{name}.tex", as_latex(table))
     for drawn in (figure for section in figures.values() for figure in section):
-        with whole_file(folder / "figures" / f"{drawn['name']}.svg") as path:
-            path.write_text(drawn["svg"], encoding="utf-8")
-    with whole_file(folder / "report.html") as path:
-        path.write_text(page, encoding="utf-8")
+        write_text(folder / "figures" / f"{drawn['name']}.svg", drawn["svg"])
+    write_text(folder / "report.html", page)
     return folder / "report.html"
 
 
@@ -188,13 +196,7 @@ def _section(section: Section, figures: list[dict[str, str]], analysis: Analysis
 
 
 def _table(table: StudyTable, alpha: float) -> dict[str, Any]:
-    above, below = table.header()
-    groups: list[tuple[str, int]] = []
-    for name in above:
-        if groups and name and groups[-1][0] == name:
-            groups[-1] = (name, groups[-1][1] + 1)
-        else:
-            groups.append((name, 1))
+    _, below = table.header()
     kinds = [table.kind(column) for column in table.frame.columns]
     rows = [
         {"cells": [(text, _class(value, kind, alpha)) for text, value, kind in zip(texts, row, kinds)], "strong": False}
@@ -207,7 +209,7 @@ def _table(table: StudyTable, alpha: float) -> dict[str, Any]:
         "key": table.key,
         "caption": table.title,
         "reference": f"form of {reference} of the thesis" if reference else "",
-        "groups": groups if any(above) else [],
+        "groups": table.groups(),
         "columns": [
             (name, ("text" if kind == "text" else "") + (" broken" if len(name) > 14 else ""))
             for name, kind in zip(below, kinds)
@@ -225,48 +227,21 @@ def _class(value: object, kind: str, alpha: float) -> str:
 
 
 def _figures(analysis: Analysis) -> dict[str, list[dict[str, str]]]:
-    responses = analysis.responses
-    figures = {
-        "methods": [
-            {
-                "name": "means_by_method",
-                "svg": means_figure(responses, resamples=analysis.resamples, seed=analysis.seed),
-                "caption": "Means by method. Bars: 95 % bootstrap intervals over participants. The vertical axes are "
-                "cut to show differences; compare the numbers, not the heights. The bars hold what differs between "
-                "participants; two methods may differ although their bars overlap, since the same "
-                "participants saw both.",
-            }
-        ],
-        "models": [],
-        "expressions": [],
-    }
-    contrasts, models = analysis.table("contrasts"), analysis.table("models")
+    """Section to its figures, each with the name of its file and its caption; what a study does not allow is absent."""
+    responses, contrasts, models = analysis.responses, analysis.table("contrasts"), analysis.table("models")
+    means = means_figure(responses, resamples=analysis.resamples, seed=analysis.seed)
+    differences = ""
     if contrasts is not None and models is not None:
-        figures["models"].append(
-            {
-                "name": "differences",
-                "svg": differences_figure(responses, contrasts, models, alpha=analysis.alpha),
-                "caption": "Differences between methods, with 95 % bootstrap intervals over participants. Filled: "
-                "shown by the mixed model with Holm's correction, for the question and for its pairs.",
-            }
-        )
-    matrix = confusion_figure(responses)
-    if matrix:
-        figures["expressions"].append(
-            {
-                "name": "confusion",
-                "svg": matrix,
-                "caption": "Confusion matrices: of all answers to films of an expression, the per cent that "
-                "named each expression.",
-            }
-        )
-    figures["expressions"].append(
-        {
-            "name": "means_by_expression",
-            "svg": expressions_figure(responses),
-            "caption": "Means by played expression and method.",
-        }
-    )
+        differences = differences_figure(responses, contrasts, models, alpha=analysis.alpha)
+    figures: dict[str, list[dict[str, str]]] = {"methods": [], "models": [], "expressions": []}
+    for section, name, svg in (
+        ("methods", "means_by_method", means),
+        ("models", "differences", differences),
+        ("expressions", "confusion", confusion_figure(responses)),
+        ("expressions", "means_by_expression", expressions_figure(responses)),
+    ):
+        if svg:
+            figures[section].append({"name": name, "svg": svg, "caption": CAPTIONS[name]})
     return figures
 
 

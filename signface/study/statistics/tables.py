@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -66,6 +67,15 @@ class StudyTable(Content):
         pairs = [column if isinstance(column, tuple) else ("", column) for column in self.frame.columns]
         return [above for above, _ in pairs], [below for _, below in pairs]
 
+    def groups(self) -> list[tuple[str, int]]:
+        """The upper header, each name with the columns that it spans; empty where the table has one line only."""
+        above, _ = self.header()
+        if not any(above):
+            return []
+        # columns without a name above them stand alone
+        runs = itertools.groupby(enumerate(above), key=lambda cell: cell[1] or cell[0])
+        return [(name if isinstance(name, str) else "", len(list(run))) for name, run in runs]
+
 
 def write_cell(cell: object, kind: str) -> str:
     """One cell as a reader sees it.
@@ -118,24 +128,16 @@ def as_text(table: StudyTable) -> str:
 
 def as_latex(table: StudyTable) -> str:
     """The table as a LaTeX `table` with booktabs' rules; its label is `tab:` and the key."""
-    above, below = table.header()
+    _, below = table.header()
     alignment = "".join("l" if table.kind(column) == "text" else "r" for column in table.frame.columns)
     lines = [r"\begin{table}", r"\centering", rf"\caption{{{_escape(table.title)}}}", rf"\label{{tab:{table.key}}}"]
     lines += [rf"\begin{{tabular}}{{{alignment}}}", r"\toprule"]
-    if any(above):
-        groups: list[tuple[str, int]] = []
-        for name in above:
-            if groups and name and groups[-1][0] == name:
-                groups[-1] = (name, groups[-1][1] + 1)
-            else:
-                groups.append((name, 1))
-        lines.append(
-            " & ".join(
-                _escape(name) if span == 1 else rf"\multicolumn{{{span}}}{{c}}{{{_escape(name)}}}"
-                for name, span in groups
-            )
-            + r" \\"
-        )
+    spans = [
+        _escape(name) if span == 1 else rf"\multicolumn{{{span}}}{{c}}{{{_escape(name)}}}"
+        for name, span in table.groups()
+    ]
+    if spans:
+        lines.append(" & ".join(spans) + r" \\")
     lines += [" & ".join(map(_escape, below)) + r" \\", r"\midrule"]
     lines += [" & ".join(map(_escape, row)) + r" \\" for row in table.cells()]
     lines += [r"\bottomrule", r"\end{tabular}"]
