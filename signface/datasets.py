@@ -162,8 +162,8 @@ def mini_examples() -> list[Example]:
     ]
 
 
-def _file(name: str, place: str) -> Path:
-    file = bundled_corpus() / place
+def _file(name: str, inside: str) -> Path:
+    file = bundled_corpus() / inside
     if not file.is_file():
         names = sorted(take.stem for take in bundled_corpus().glob("*.c3d"))
         raise SignfaceError(f"there is no take {name}", hint=f"the takes are {', '.join(names)}")

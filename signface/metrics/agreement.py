@@ -23,6 +23,7 @@ import pandas as pd
 
 from signface.content import Content
 from signface.errors import SignfaceError
+from signface.extras import needed
 
 #: How the absence of an annotation is named.
 NOTHING = "nothing"
@@ -70,12 +71,6 @@ def cohen_kappa(first: np.ndarray, second: np.ndarray) -> float:
     if len(set(first) | set(second)) < 2:
         return float("nan")
     return float(cohen_kappa_score(first, second))
-
-
-def _kappa(table: np.ndarray, chance: float) -> float:
-    """Kappa of a square table of counts, given the agreement expected by chance."""
-    observed = np.trace(table) / table.sum()
-    return float("nan") if 1 - chance < 1e-12 else float((observed - chance) / (1 - chance))
 
 
 def krippendorff_alpha(labels: np.ndarray) -> float:
@@ -183,9 +178,11 @@ def modified_kappa(first: pd.DataFrame, second: pd.DataFrame, *, overlap: float 
         return ModifiedKappa(float("nan"), float("nan"), float("nan"), table)
     rows, columns = counts.sum(axis=1), counts.sum(axis=0)
     chance = float(np.trace(_fitted(rows, columns))) / total
-    highest = np.minimum(rows, columns).sum() / total
-    kappa_max = float("nan") if 1 - chance < 1e-12 else float((highest - chance) / (1 - chance))
-    return ModifiedKappa(_kappa(counts, chance), kappa_max, float(np.trace(counts) / total), table)
+    raw, highest = float(np.trace(counts)) / total, float(np.minimum(rows, columns).sum()) / total
+    kappa, kappa_max = (
+        float((share - chance) / (1 - chance)) if 1 - chance >= 1e-12 else float("nan") for share in (raw, highest)
+    )
+    return ModifiedKappa(kappa, kappa_max, float(raw), table)
 
 
 def _fitted(rows: np.ndarray, columns: np.ndarray, *, rounds: int = 2000) -> np.ndarray:
@@ -218,14 +215,10 @@ def gamma(tables: Sequence[pd.DataFrame], *, seed: int = 0) -> float:
     """
     if any(len(table) == 0 for table in tables):
         return float("nan")
-    try:
-        from pyannote.core import Segment
-        from pygamma_agreement import CombinedCategoricalDissimilarity, Continuum
-    except ImportError as error:
-        raise SignfaceError(
-            "the gamma measure needs pygamma-agreement", hint='install it with pip install "signface[agreement]"'
-        ) from error
-    continuum = Continuum()
+    package = needed("pygamma_agreement", "agreement")
+    from pyannote.core import Segment
+
+    continuum = package.Continuum()
     for number, table in enumerate(tables):
         for row in table.itertuples(index=False):
             continuum.add(f"annotator {number}", Segment(float(row.start_s), float(row.end_s)), str(row.label))
@@ -234,7 +227,7 @@ def gamma(tables: Sequence[pd.DataFrame], *, seed: int = 0) -> float:
     try:
         logging.root.setLevel(logging.ERROR)  # it warns at every step that a faster solver could be installed
         np.random.seed(seed)  # noqa: NPY002
-        result = continuum.compute_gamma(CombinedCategoricalDissimilarity(alpha=3, beta=1))
+        result = continuum.compute_gamma(package.CombinedCategoricalDissimilarity(alpha=3, beta=1))
     finally:
         logging.root.setLevel(level)
         np.random.set_state(state)  # noqa: NPY002

@@ -99,6 +99,12 @@ class _OnUnion:
         self.union = sites.union
         self._row = {int(vertex): row for row, vertex in enumerate(self.union)}
         self.blocks = [self.rows(group) for group in sites.groups]
+        sizes = np.array([len(block) for block in self.blocks])
+        #: Sites of one size at a time, and their rows, (sites, size).
+        self.stacks = [
+            (which, np.array([self.blocks[site] for site in which]))
+            for which in (np.flatnonzero(sizes == size) for size in np.unique(sizes))
+        ]
 
     def rows(self, vertices: Sequence[int] | np.ndarray) -> np.ndarray:
         """(3 k,) rows of the coordinates of some vertices."""
@@ -140,9 +146,8 @@ class Reconstruction(_OnUnion):
     def gains(self) -> np.ndarray:
         """(S,) by how much each site would lower the mean squared error."""
         result = np.empty(len(self.blocks))
-        for size in {len(block) for block in self.blocks}:
-            which = [k for k, block in enumerate(self.blocks) if len(block) == size]
-            rows = np.array([self.blocks[k] for k in which])
+        for which, rows in self.stacks:
+            size = rows.shape[1]
             inner = self._covariance[rows[:, :, None], rows[:, None, :]].copy()
             inner[:, np.arange(size), np.arange(size)] += self._noise[rows]
             cross = self._cross[rows]
@@ -192,11 +197,10 @@ class OptimalDesign(_OnUnion):
     def gains(self) -> np.ndarray:
         """(S,) by how much each site would raise `log det M`, or lower `tr(G M^-1)`."""
         result = np.empty(len(self.blocks))
-        for size in {len(block) for block in self.blocks}:
-            which = [k for k, block in enumerate(self.blocks) if len(block) == size]
-            columns = self._columns[np.array([self.blocks[k] for k in which])]
+        for which, rows in self.stacks:
+            columns = self._columns[rows]
             spread = columns @ self._covariance
-            inner = spread @ columns.transpose(0, 2, 1) + np.eye(size)
+            inner = spread @ columns.transpose(0, 2, 1) + np.eye(rows.shape[1])
             if self._metric is None:
                 result[which] = np.linalg.slogdet(inner)[1]
             else:

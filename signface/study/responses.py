@@ -52,6 +52,12 @@ FACTORS = {
     "method": "method",
 }
 
+#: The columns of a study's csv, in its order.
+COLUMNS = (
+    *("participant", *PERSONAL, "stimulus", "expression", "intensity", "method"),
+    *("answer_expression", *SCALES),
+)
+
 _YES = {"yes", "oui", "y", "o", "true", "vrai", "1"}
 _NO = {"no", "non", "n", "false", "faux", "0"}
 

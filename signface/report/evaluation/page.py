@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,18 @@ from signface.report.pages import page_table, render_page
 #: Digits of a SHA-256 that are shown; the whole of it stands in metrics.json and recordings.csv.
 DIGITS = 12
 
+#: Sections in order: key, title, and what writes their paragraphs and tables.
+SECTIONS: tuple[tuple[str, str, Callable[[Evaluated], sections.Content]], ...] = (
+    ("accuracy", "Labels", sections.labels),
+    ("segmentation", "Boundaries and segments", sections.segmentation),
+    ("confusions", "What is taken for what", sections.confusions),
+    ("signers", "Signer by signer", sections.signers),
+    ("comparison", "Classifiers against each other", sections.comparison),
+    ("confidence", "Confidence, intensity, parameters", sections.confidence),
+    ("curve", "What more material brings", sections.curve),
+    ("importance", "Which bases matter", sections.importance),
+)
+
 
 def evaluation_page(evaluated: Evaluated, drawn: Mapping[str, Sequence[Drawn]]) -> str:
     """The report as one HTML page with nothing outside it.
@@ -30,18 +42,6 @@ def evaluation_page(evaluated: Evaluated, drawn: Mapping[str, Sequence[Drawn]]) 
         Of `signface.report.evaluation.report.draw_all`.
     """
     metrics, facts = evaluated.metrics, evaluated.facts
-    shown = [
-        _section("accuracy", "Labels", sections.labels(evaluated), drawn["accuracy"]),
-        _section("segmentation", "Boundaries and segments", sections.segmentation(evaluated), drawn["segmentation"]),
-        _section("confusions", "What is taken for what", sections.confusions(evaluated), drawn["confusions"]),
-        _section("signers", "Signer by signer", sections.signers(evaluated), []),
-        _section("comparison", "Classifiers against each other", sections.comparison(evaluated), []),
-        _section(
-            "confidence", "Confidence, intensity, parameters", sections.confidence(evaluated), drawn["confidence"]
-        ),
-        _section("curve", "What more material brings", sections.curve(evaluated), drawn["curve"]),
-        _section("importance", "Which bases matter", sections.importance(evaluated), drawn["importance"]),
-    ]
     figures = {figure.name: figure for kind in ("worst", "gallery") for figure in drawn[kind]}
     return render_page(
         "evaluation.html.j2",
@@ -57,7 +57,7 @@ def evaluation_page(evaluated: Evaluated, drawn: Mapping[str, Sequence[Drawn]]) 
         classifiers=words.classifier_words(metrics["classifiers"]),
         facts=_facts(evaluated),
         labels={value: evaluated.vocabulary.describe(value) for value in evaluated.vocabulary.values},
-        sections=shown,
+        sections=[_section(key, title, write(evaluated), drawn.get(key, ())) for key, title, write in SECTIONS],
         best=evaluated.best,
         far=f"{FAR_S:.2f}",
         worst=[_take(verdict, figures) for verdict in evaluated.worst],
@@ -76,19 +76,11 @@ def evaluation_page(evaluated: Evaluated, drawn: Mapping[str, Sequence[Drawn]]) 
     )
 
 
-def _section(
-    key: str, title: str, content: tuple[list[str], list[dict[str, Any]]], figures: Sequence[Drawn]
-) -> dict[str, Any]:
-    paragraphs, shown = content
+def _section(key: str, title: str, content: sections.Content, figures: Sequence[Drawn]) -> dict[str, Any]:
+    paragraphs, page_tables = content
     folded = "Every matrix in numbers" if key == "confusions" else ""
-    return {
-        "key": key,
-        "title": title,
-        "paragraphs": paragraphs,
-        "tables": shown,
-        "figures": list(figures),
-        "folded": folded,
-    }
+    words = {"key": key, "title": title, "paragraphs": paragraphs, "folded": folded}
+    return words | {"tables": page_tables, "figures": list(figures)}
 
 
 def _facts(evaluated: Evaluated) -> list[tuple[str, str, str]]:
@@ -135,7 +127,7 @@ def _provenance(evaluated: Evaluated) -> list[tuple[str, str, str]]:
     facts = evaluated.facts
     rows = [("recordings and annotations", f"{len(facts['recordings'])} takes of {facts['name']}", facts["digest"])]
     for what, key in (("face", "faces"), ("layout", "layouts"), ("solver and readers", "solvers")):
-        rows += [(what, Path(own["name"]).name, own["sha256"]) for own in facts[key]]
+        rows += [(what, Path(file["name"]).name, file["sha256"]) for file in facts[key]]
     return rows
 
 

@@ -13,24 +13,7 @@ from signface.files import whole_file
 from signface.study.design import Study
 from signface.study.questionnaire.questionnaire import PERSONAL
 from signface.study.questionnaire.store import Store
-
-#: The columns that every export has, in this order; other questions follow.
-COLUMNS = (
-    "participant",
-    "age",
-    "gender",
-    "avatar_habit",
-    "vision_problem",
-    "stimulus",
-    "expression",
-    "intensity",
-    "method",
-    "answer_expression",
-    "answer_intensity",
-    "answer_difficulty",
-    "answer_credibility",
-    "answer_fidelity",
-)
+from signface.study.responses import COLUMNS
 
 
 def export_table(study: Study, store: Store, *, finished_only: bool = False) -> tuple[list[str], list[dict[str, str]]]:
@@ -52,24 +35,24 @@ def export_table(study: Study, store: Store, *, finished_only: bool = False) -> 
     stimuli = study.stimuli
     personal: dict[int, dict[str, str]] = {}
     rows: dict[tuple[int, str], dict[str, str]] = {}
-    for participant, stimulus, question, value in answers:
+    for participant, name, question, value in answers:
         if participant not in wanted:
             continue
-        if stimulus == PERSONAL:
+        if name == PERSONAL:
             personal.setdefault(participant, {})[question] = value
-        elif stimulus in stimuli:
-            rows.setdefault((participant, stimulus), {})[question] = value
+        elif name in stimuli:
+            rows.setdefault((participant, name), {})[question] = value
     asked = [question.column for question in study.personal] + list(study.questions)
     columns = [*COLUMNS, *(column for column in asked if column not in COLUMNS)]
     table = []
     for (participant, name), values in rows.items():
-        shown = stimuli[name]
+        stimulus = stimuli[name]
         cells = {
             "participant": wanted[participant],
             "stimulus": name,
-            "expression": shown.expression,
-            "intensity": str(shown.intensity),
-            "method": shown.method,
+            "expression": stimulus.expression,
+            "intensity": str(stimulus.intensity),
+            "method": stimulus.method,
             **personal.get(participant, {}),
             **values,
         }

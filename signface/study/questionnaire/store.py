@@ -217,12 +217,14 @@ class Store:
 
     def was_shown(self, participant: Participant, stimulus: str) -> bool:
         """Whether a stimulus was shown to a participant."""
-        table = self._tables["shown"]
         with self._engine.connect() as connection:
-            query = self._sql.select(table.c.stimulus).where(
-                table.c.participant == participant.id, table.c.stimulus == stimulus
-            )
-            return connection.execute(query).one_or_none() is not None
+            return self._was_shown(connection, participant, stimulus)
+
+    def _was_shown(self, connection: Any, participant: Participant, stimulus: str) -> bool:
+        table = self._tables["shown"]
+        query = self._sql.select(table.c.stimulus)
+        query = query.where(table.c.participant == participant.id, table.c.stimulus == stimulus)
+        return connection.execute(query).one_or_none() is not None
 
     def answer(self, participant: Participant, block: int, stimulus: str, values: Mapping[str, str]) -> None:
         """Keep the answers of one page, in one transaction: all of them or none.
@@ -236,28 +238,15 @@ class Store:
             `not shown`: the stimulus was not shown to the participant. `final`: the block is closed. `unknown`: the
             participant was erased meanwhile.
         """
-        answers, shown = self._tables["answers"], self._tables["shown"]
+        answers = self._tables["answers"]
         with self._writing() as connection:
             row = self._locked(connection, participant)
             if row.finished_at is not None or row.closed > max(block, 0):
                 raise Refused("final")
-            if stimulus:
-                query = self._sql.select(shown.c.stimulus).where(
-                    shown.c.participant == participant.id, shown.c.stimulus == stimulus
-                )
-                if connection.execute(query).one_or_none() is None:
-                    raise Refused("not shown")
-            now = datetime.now(UTC)
-            rows = [
-                {
-                    "participant": participant.id,
-                    "stimulus": stimulus,
-                    "question": question,
-                    "value": value,
-                    "answered_at": now,
-                }
-                for question, value in values.items()
-            ]
+            if stimulus and not self._was_shown(connection, participant, stimulus):
+                raise Refused("not shown")
+            page = {"participant": participant.id, "stimulus": stimulus, "answered_at": datetime.now(UTC)}
+            rows = [page | {"question": question, "value": value} for question, value in values.items()]
             if rows:
                 statement = self._insert(answers)
                 connection.execute(

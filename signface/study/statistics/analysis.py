@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from threadpoolctl import threadpool_limits
+
 from signface.study.responses import Responses
 from signface.study.statistics.findings import findings
 from signface.study.statistics.model_tables import compare_methods, contrasts_table, models_table, posthoc_table
@@ -84,6 +86,48 @@ class Analysis:
         return next((table for table in self.tables if table.key == key), None)
 
 
+#: Sections in order: title and what each answers.
+SECTIONS = {
+    "methods": (
+        "Do the methods differ?",
+        "Means, then one null hypothesis per question tested between all methods, then every pair of methods.",
+    ),
+    "models": (
+        "Do the methods differ when a participant's answers belong together?",
+        "The same questions asked of models and tests that know who answered.",
+    ),
+    "interactions": (
+        "Does the effect of the method depend on something else?",
+        "Two factors at a time and their interaction, on ranks.",
+    ),
+    "expressions": (
+        "What was recognised, and how did each expression fare?",
+        "Confusion matrices by method, and means by played expression.",
+    ),
+    "participants": (
+        "Do the participants, or what was played, explain the answers?",
+        "What is significant comes first, with the reasons to doubt it.",
+    ),
+}
+
+#: Tables of interactions: key, pairs of factors, title and the thesis's table of that form.
+INTERACTIONS = (
+    (
+        "interactions",
+        (("expression", "method"), ("intensity", "method")),
+        "Interaction of the method with what was played (Scheirer-Ray-Hare)",
+        "6.5",
+    ),
+    (
+        "interactions_participants",
+        (("gender", "method"), ("vision_problem", "method"), ("expression", "intensity")),
+        "Interactions with the participants, and of expression with intensity (Scheirer-Ray-Hare)",
+        "A.4",
+    ),
+)
+
+
+@threadpool_limits.wrap(limits=1, user_api="blas")  # small matrices: threads that wait for each other cost tenfold
 def analyse(responses: Responses, *, alpha: float = 0.05, resamples: int = 2000, seed: int = 0) -> Analysis:
     """Make every table that a study allows.
 
@@ -97,84 +141,31 @@ def analyse(responses: Responses, *, alpha: float = 0.05, resamples: int = 2000,
     seed : int
         Of the bootstrap.
     """
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(1, "blas"):  # small matrices: threads that wait for each other cost more than they give
-        return _analyse(responses, alpha, resamples, seed)
-
-
-def _analyse(responses: Responses, alpha: float, resamples: int, seed: int) -> Analysis:
-    compare = len(responses.methods) > 1
-    influences = influence_results(responses)
-    said: tuple[str, ...] = ()
-    hypotheses = hypotheses_table(responses)
-    sections = [
-        Section(
-            "methods",
-            "Do the methods differ?",
-            "Means, then one null hypothesis per question tested between all methods, then every pair of methods.",
-            tuple(
-                [means_table(responses)]
-                + ([hypotheses, pairwise_table(responses), pairwise_matrix(responses)] if compare else [])
-            ),
-        ),
-    ]
-    if compare:
+    tables: dict[str, list[StudyTable]] = {"methods": [means_table(responses)]}
+    sentences: tuple[str, ...] = ()
+    if len(responses.methods) > 1:
+        hypotheses = hypotheses_table(responses)
+        tables["methods"] += [hypotheses, pairwise_table(responses), pairwise_matrix(responses)]
         comparisons = {column: compare_methods(responses, column) for column in responses.questions}
         contrasts = contrasts_table(responses, comparisons, resamples=resamples, seed=seed)
         power = power_table(responses, alpha=alpha)
-        said = findings(responses, comparisons, hypotheses, contrasts, power, alpha=alpha)
-        sections.append(
-            Section(
-                "models",
-                "Do the methods differ when a participant's answers belong together?",
-                "The same questions asked of models and tests that know who answered.",
-                (models_table(responses, comparisons), contrasts, posthoc_table(responses), power),
-            )
-        )
-    crossed = interactions_table(
-        responses,
-        [("expression", "method"), ("intensity", "method")],
-        key="interactions",
-        title="Interaction of the method with what was played (Scheirer-Ray-Hare)",
-        reference="6.5",
-    )
-    others = interactions_table(
-        responses,
-        [("gender", "method"), ("vision_problem", "method"), ("expression", "intensity")],
-        key="interactions_participants",
-        title="Interactions with the participants, and of expression with intensity (Scheirer-Ray-Hare)",
-        reference="A.4",
-    )
-    tables = [table for table in (crossed, others) if len(table.frame)]
-    if tables:
-        sections.append(
-            Section(
-                "interactions",
-                "Does the effect of the method depend on something else?",
-                "Two factors at a time and their interaction, on ranks.",
-                tuple(tables),
-            )
-        )
-    sections.append(
-        Section(
-            "expressions",
-            "What was recognised, and how did each expression fare?",
-            "Confusion matrices by method, and means by played expression.",
-            (*confusion_tables(responses), expression_means(responses), expression_means(responses, by_method=True)),
-        )
-    )
-    about = [remarks_table(responses, influences, alpha=alpha), influence_table(responses, influences)]
-    about += [influence_details(responses, influences)]
-    groups = [habit_table(responses), *(group_table(responses, factor) for factor in ("vision_problem", "gender"))]
-    about += [table for table in groups if table is not None]
+        sentences = findings(responses, comparisons, hypotheses, contrasts, power, alpha=alpha)
+        tables["models"] = [models_table(responses, comparisons), contrasts, posthoc_table(responses), power]
+    crossed = [
+        interactions_table(responses, pairs, key=key, title=title, reference=reference)
+        for key, pairs, title, reference in INTERACTIONS
+    ]
+    tables["interactions"] = [table for table in crossed if len(table.frame)]
+    means = (expression_means(responses), expression_means(responses, by_method=True))
+    tables["expressions"] = [*confusion_tables(responses), *means]
+    influences = influence_results(responses)
     if influences:
-        sections.append(
-            Section(
-                "participants",
-                "Do the participants, or what was played, explain the answers?",
-                "What is significant comes first, with the reasons to doubt it.",
-                tuple(about),
-            )
-        )
-    return Analysis(responses, tuple(sections), alpha, seed, resamples, said)
+        groups = [habit_table(responses), *(group_table(responses, factor) for factor in ("vision_problem", "gender"))]
+        tables["participants"] = [
+            remarks_table(responses, influences, alpha=alpha),
+            influence_table(responses, influences),
+            influence_details(responses, influences),
+            *(table for table in groups if table is not None),
+        ]
+    sections = [Section(key, *words, tuple(tables[key])) for key, words in SECTIONS.items() if tables.get(key)]
+    return Analysis(responses, tuple(sections), alpha, seed, resamples, sentences)

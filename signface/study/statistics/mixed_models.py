@@ -20,6 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import minimize
+from scipy.special import expit
+from threadpoolctl import threadpool_limits
 
 from signface.errors import SignfaceError
 from signface.study.statistics.random_effects import Levels
@@ -87,27 +90,20 @@ class OrdinalMixedModel:
     """
 
     def __init__(self, answers: ArrayLike, fixed: ArrayLike, groupings: Sequence[ArrayLike]) -> None:
-        values, self._place = np.unique(np.asarray(answers, float), return_inverse=True)
+        values, self._answers = np.unique(np.asarray(answers, float), return_inverse=True)
         if len(values) < 2:
             raise SignfaceError("an ordinal model needs two different answers", hint="leave this question out")
         self._fixed = np.asarray(fixed, float)
         self._cuts = len(values) - 1
-        self._levels = Levels(len(self._place), groupings)
+        self._levels = Levels(len(self._answers), groupings)
         # which threshold bounds an answer above and below: index 0 is −∞, the last +∞
-        self._above, self._below = self._place + 1, self._place
+        self._above, self._below = self._answers + 1, self._answers
         self._modes = np.zeros(self._levels.size)
 
+    @threadpool_limits.wrap(limits=1, user_api="blas")  # small matrices: threads that wait for each other cost tenfold
     def fit(self) -> OrdinalFit:
         """Maximise the likelihood."""
-        from threadpoolctl import threadpool_limits
-
-        with threadpool_limits(1, "blas"):  # matrices of a hundred rows: threads that wait for each other cost tenfold
-            return self._fit()
-
-    def _fit(self) -> OrdinalFit:
-        from scipy.optimize import minimize
-
-        shares = np.cumsum(np.bincount(self._place))[:-1] / len(self._place)
+        shares = np.cumsum(np.bincount(self._answers))[:-1] / len(self._answers)
         start_cuts = np.log(shares / (1 - shares))
         start = np.concatenate(
             [
@@ -128,11 +124,11 @@ class OrdinalMixedModel:
         except np.linalg.LinAlgError:
             covariance = np.full_like(information, np.nan)
         cuts, width = self._cuts, self._fixed.shape[1]
-        part = slice(cuts, cuts + width)
+        fixed = slice(cuts, cuts + width)
         return OrdinalFit(
             self._thresholds(optimum.x[:cuts]),
-            optimum.x[part],
-            np.asarray(covariance[part, part], float),
+            optimum.x[fixed],
+            np.asarray(covariance[fixed, fixed], float),
             np.abs(optimum.x[cuts + width :]).astype(float),
             -float(optimum.fun),
             bool(gradient < 1e-2 and np.isfinite(optimum.fun)),
@@ -238,8 +234,6 @@ class _Curves:
     """
 
     def __init__(self, thetas: Array, predictor: Array, above: NDArray[np.intp], below: NDArray[np.intp]) -> None:
-        from scipy.special import expit
-
         bounds = np.concatenate([[-np.inf], thetas, [np.inf]])
         u, low = bounds[above] - predictor, bounds[below] - predictor
         # P(l < · ≤ u) computed in the tail where both are small, so that no digits cancel

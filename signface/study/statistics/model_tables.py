@@ -16,6 +16,7 @@ from itertools import combinations
 import numpy as np
 import pandas as pd
 from scipy import stats
+from threadpoolctl import threadpool_limits
 
 from signface.extras import needed
 from signface.study.responses import Responses
@@ -62,6 +63,7 @@ class MethodComparison:
     over_participants: TestResult
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def compare_methods(responses: Responses, column: str) -> MethodComparison:
     """Compare the methods on one question, taking a participant's answers as belonging together.
 
@@ -77,13 +79,10 @@ def compare_methods(responses: Responses, column: str) -> MethodComparison:
         The mixed model has random intercepts for participants, for participants × methods (a person's own reaction to a
         method, without which its p-values are too small) and for what was played.
     """
-    from threadpoolctl import threadpool_limits
-
     table = responses.table.assign(item=responses.item()).dropna(subset=[column])
     methods = sorted(table["method"].unique())
-    with threadpool_limits(1, "blas"):  # matrices of a hundred rows: threads that wait for each other cost tenfold
-        mixed, ratio, spreads = _mixed(table, column, methods)
-        averaged = _averaged(table, column, methods)
+    mixed, ratio, spreads = _mixed(table, column, methods)
+    averaged = _averaged(table, column, methods)
     means = participant_means(responses, column).reindex(columns=methods)
     over = (
         friedman(means.to_numpy())
@@ -256,37 +255,24 @@ def contrasts_table(
         intervals = difference_intervals(responses.table, column, comparison.methods, resamples=resamples, seed=seed)
         means = participant_means(responses, column)
         pairs = list(combinations(comparison.methods, 2))
-        odds, model_p, people = {}, [], []
-        for first, second in pairs:
-            ratio, p = "–", math.nan
-            if comparison.mixed is not None:
-                weights = [float(method == first) - float(method == second) for method in comparison.methods[1:]]
-                value, error = comparison.mixed.contrast(weights)
-                if error > 0 and np.isfinite(error):
-                    around = stats.t(freedom(len(means), len(comparison.methods)))
-                    p = float(2 * around.sf(abs(value / error)))
-                    low, high = np.exp(value + around.ppf([0.025, 0.975]) * error)
-                    ratio = f"{np.exp(value):.2f} [{low:.2f}, {high:.2f}]"
-            odds[first, second] = ratio
-            model_p.append(p)
-            people.append(wilcoxon(means[first], means[second]))
+        odds = [_odds(comparison, first, second, len(means)) for first, second in pairs]
+        people = [wilcoxon(means[first], means[second]) for first, second in pairs]
+        corrected, corrected_people = holm([p for _, p in odds]), holm([result.p for result in people])
         rows += [
             {
                 ("", "question"): responses.questions[column],
-                ("", "pair"): f"{first} – {second}",
-                ("difference of means", "first − second"): intervals[first, second][0],
-                ("difference of means", "low"): intervals[first, second][1],
-                ("difference of means", "high"): intervals[first, second][2],
-                ("mixed model", "odds ratio, 95 %"): odds[first, second],
-                ("mixed model", "p"): model_p[place],
-                ("mixed model", "p (Holm)"): float(corrected),
-                ("over participants", "r"): people[place].effect,
-                ("over participants", "p"): people[place].p,
-                ("over participants", "p (Holm)"): float(by_people),
+                ("", "pair"): " – ".join(pair),
+                ("difference of means", "first − second"): intervals[pair][0],
+                ("difference of means", "low"): intervals[pair][1],
+                ("difference of means", "high"): intervals[pair][2],
+                ("mixed model", "odds ratio, 95 %"): odds[row][0],
+                ("mixed model", "p"): odds[row][1],
+                ("mixed model", "p (Holm)"): float(corrected[row]),
+                ("over participants", "r"): people[row].effect,
+                ("over participants", "p"): people[row].p,
+                ("over participants", "p (Holm)"): float(corrected_people[row]),
             }
-            for place, ((first, second), corrected, by_people) in enumerate(
-                zip(pairs, holm(model_p), holm([result.p for result in people]))
-            )
+            for row, pair in enumerate(pairs)
         ]
     kinds: dict[str | tuple[str, str], str] = {
         (part, name): "p" for part in ("mixed model", "over participants") for name in ("p", "p (Holm)")
@@ -302,6 +288,19 @@ def contrasts_table(
             "over participants: Wilcoxon on one mean per participant and method. Holm's correction within a question.",
         ),
     )
+
+
+def _odds(comparison: MethodComparison, first: str, second: str, people: int) -> tuple[str, float]:
+    """Odds ratio of a pair of methods with its 95 % interval, and p, both by the mixed model."""
+    if comparison.mixed is None:
+        return "–", math.nan
+    weights = [float(method == first) - float(method == second) for method in comparison.methods[1:]]
+    value, error = comparison.mixed.contrast(weights)
+    if not (error > 0 and np.isfinite(error)):
+        return "–", math.nan
+    around = stats.t(freedom(people, len(comparison.methods)))
+    low, high = np.exp(value + around.ppf([0.025, 0.975]) * error)
+    return f"{np.exp(value):.2f} [{low:.2f}, {high:.2f}]", float(2 * around.sf(abs(value / error)))
 
 
 def posthoc_table(responses: Responses) -> StudyTable:

@@ -23,7 +23,7 @@ import pandas as pd
 
 from signface.content import Content
 from signface.errors import SignfaceError
-from signface.study.responses import PERSONAL, QUESTIONS, REQUIRED, SCALES
+from signface.study.responses import COLUMNS, QUESTIONS
 
 EXPRESSIONS = ("A", "D", "F", "J", "Sa", "Su")
 
@@ -153,7 +153,7 @@ def study_design(name: str) -> Design:
     rows, asked, labels = [], {}, []
     for block in study.blocks:
         columns = {question.column for question in block.questions}
-        own = frozenset(column for column in QUESTIONS if _CSV.get(column, column) in columns)
+        columns_asked = frozenset(column for column in QUESTIONS if _CSV.get(column, column) in columns)
         labels += [
             choice.value
             for question in block.questions
@@ -161,7 +161,7 @@ def study_design(name: str) -> Design:
             for choice in question.choices
         ]
         for stimulus in block.stimuli:
-            asked[stimulus.name] = own
+            asked[stimulus.name] = columns_asked
             rows.append(
                 {
                     "stimulus": stimulus.name,
@@ -170,7 +170,7 @@ def study_design(name: str) -> Design:
                     "method": stimulus.method,
                 }
             )
-    questions = tuple(column for column in QUESTIONS if any(column in own for own in asked.values()))
+    questions = tuple(column for column in QUESTIONS if any(column in of_stimulus for of_stimulus in asked.values()))
     if not questions:
         raise SignfaceError(
             "asks nothing that can be simulated",
@@ -218,7 +218,7 @@ def simulate(
     rng = np.random.default_rng(seed)
     stimuli = design.stimuli.reset_index(drop=True)
     labels = sorted(set(stimuli["expression"]) | set(design.labels))
-    method_place = stimuli["method"].map(methods.index).to_numpy()
+    method_index = stimuli["method"].map(methods.index).to_numpy()
     width = len(str(count))
     blocks = []
     for number in range(1, count + 1):
@@ -236,7 +236,7 @@ def simulate(
             participant_shift = rng.normal(0, effects.participants)
             reactions = rng.normal(0, effects.reactions, len(methods)) if effects.reactions else np.zeros(len(methods))
             shift = np.array([effects.of(method, question) for method in methods]) + reactions
-            level = participant_shift + shift[method_place[block.index]]
+            level = participant_shift + shift[method_index[block.index]]
             if question == "correct":
                 block["answer_expression"] = _recognise(block["expression"].tolist(), level, labels, rng)
             else:
@@ -246,8 +246,7 @@ def simulate(
             block[column] = block[column].where(answered)
         blocks.append(block)
     table = pd.concat(blocks, ignore_index=True).assign(simulated="yes")
-    columns = [REQUIRED[0], *PERSONAL, "stimulus", "expression", "intensity", "method", "answer_expression", *SCALES]
-    return table.reindex(columns=[*columns, "simulated"])
+    return table.reindex(columns=[*COLUMNS, "simulated"])
 
 
 def _recognise(played: list[str], level: np.ndarray, labels: list[str], rng: np.random.Generator) -> list[str]:
