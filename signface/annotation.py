@@ -140,15 +140,15 @@ class Annotation(Content):
         table = self.segments.table
         stable = table[table["kind"] == "stable"]
         seconds = (stable["end_s"] - stable["start_s"]).rename("seconds")
-        parts = []
+        labels = []
         for label, total in seconds.groupby(stable["label"]).sum().sort_values(ascending=False).items():
             rows = stable["label"] == label
             confidence = np.average(stable.loc[rows, "confidence"], weights=seconds[rows])
-            parts.append(f"{self.vocabulary.describe(str(label))} {total:.1f} s (confidence {confidence:.0%})")
+            labels.append(f"{self.vocabulary.describe(str(label))} {total:.1f} s (confidence {confidence:.0%})")
         residual = self.residual_mm
         fit = "" if residual is None else f"; the solved face lies {residual:.2f} mm from the markers (median residual)"
         duration = f"{self.descriptors.duration:.1f} s"
-        return f"{duration}, {_count(len(stable), 'stable segment')}: {', '.join(parts) or 'none'}{fit}"
+        return f"{duration}, {_count(len(stable), 'stable segment')}: {', '.join(labels) or 'none'}{fit}"
 
     def _repr_html_(self) -> str:
         return f"<p>{self.name}: {self}</p>{self.segments.table.to_html(index=False)}"

@@ -184,8 +184,8 @@ def _exact_columns(piece: Descriptors, words: Mapping[str, str]) -> dict[str, pa
     if piece.deviation is not None:
         numbers |= {DEVIATION + name: values for name, values in zip(piece.names, piece.deviation.T, strict=True)}
     numbers[RESIDUAL] = piece.residual
-    said = {word: pa.repeat(pa.scalar(text), frames).dictionary_encode() for word, text in words.items()}
-    return said | {name: _arrow(values, unknown=False) for name, values in numbers.items()}
+    columns = {word: pa.repeat(pa.scalar(text), frames).dictionary_encode() for word, text in words.items()}
+    return columns | {name: _arrow(values, unknown=False) for name, values in numbers.items()}
 
 
 def _arrow(column: np.ndarray, *, unknown: bool = True) -> pa.Array:

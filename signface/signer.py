@@ -47,12 +47,14 @@ class SignerBases(Content):
     source: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
-        places = np.array(self.displacements, dtype=np.float64)
-        if places.shape != (len(self.bases), 3) or len(self.bases) != len(self.markers):
-            raise SignfaceError(f"{len(self.bases)} bases of a signer do not match displacements of {places.shape}")
-        if not np.isfinite(places).all():
+        displacements = np.array(self.displacements, dtype=np.float64)
+        if displacements.shape != (len(self.bases), 3) or len(self.bases) != len(self.markers):
+            raise SignfaceError(
+                f"{len(self.bases)} bases of a signer do not match displacements of {displacements.shape}"
+            )
+        if not np.isfinite(displacements).all():
             raise SignfaceError("has cells that are not numbers", file=self.source or None)
-        self._hold(displacements=places)
+        self._hold(displacements=displacements)
 
     @classmethod
     def read(cls, path: str | PathLike[str]) -> SignerBases:
@@ -68,8 +70,8 @@ class SignerBases(Content):
         file = Path(path)
         try:
             table = pd.read_csv(file, dtype={"base": str, "marker": str})
-            places = table[["x", "y", "z"]].to_numpy(dtype=np.float64)
-            return cls(tuple(table["base"]), tuple(table["marker"]), places, source=str(file))
+            displacements = table[["x", "y", "z"]].to_numpy(dtype=np.float64)
+            return cls(tuple(table["base"]), tuple(table["marker"]), displacements, source=str(file))
         except FileNotFoundError:
             raise SignfaceError("no such file", file=file) from None
         except (OSError, ValueError, KeyError) as error:
@@ -83,20 +85,20 @@ class SignerBases(Content):
     def of(cls, bases: np.ndarray, learnt: Sequence[str], face: FaceModel, layout: MarkerLayout) -> SignerBases:
         """Those of the (N, P, 3) bases at a layout's markers that were learnt: the others are the avatar's."""
         rows = [
-            (name, marker, place)
+            (name, marker, displacement)
             for name in learnt
-            for marker, place in zip(layout.face_labels, bases[face.names.index(name)], strict=True)
+            for marker, displacement in zip(layout.face_labels, bases[face.names.index(name)], strict=True)
         ]
-        names, markers, places = zip(*rows, strict=True) if rows else ((), (), np.zeros((0, 3)))
-        return cls(names, markers, np.array(places))
+        names, markers, displacements = zip(*rows, strict=True) if rows else ((), (), np.zeros((0, 3)))
+        return cls(names, markers, np.array(displacements))
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the bases as a csv, which `read` reads."""
         with whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
             writer = csv.writer(stream)
             writer.writerow(["base", "marker", "x", "y", "z"])
-            for base, marker, place in zip(self.bases, self.markers, self.displacements, strict=True):
-                writer.writerow([base, marker, *(f"{value:.5f}" for value in place)])
+            for base, marker, displacement in zip(self.bases, self.markers, self.displacements, strict=True):
+                writer.writerow([base, marker, *(f"{value:.5f}" for value in displacement)])
 
     def at(self, face: FaceModel, layout: MarkerLayout) -> np.ndarray:
         """(N, P, 3) bases at the markers of a layout; what is not known of the signer is the avatar's.
@@ -108,9 +110,9 @@ class SignerBases(Content):
         """
         base_at, marker_at = ({name: i for i, name in enumerate(names)} for names in (face.names, layout.face_labels))
         placed, known = layout.bases(face), 0
-        for base, marker, place in zip(self.bases, self.markers, self.displacements, strict=True):
+        for base, marker, displacement in zip(self.bases, self.markers, self.displacements, strict=True):
             if base in base_at and marker in marker_at:
-                placed[base_at[base], marker_at[marker]] = place
+                placed[base_at[base], marker_at[marker]] = displacement
                 known += 1
         if not known:
             raise SignfaceError(
@@ -218,19 +220,19 @@ class Signer:
         """SHA-256 of the level; empty where there is none."""
         return self._digest_of("level")
 
-    def _digest_of(self, part: str) -> str:
-        content = self._plain().get(part)
+    def _digest_of(self, field: str) -> str:
+        content = self._plain().get(field)
         return "" if content is None else hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
     def _plain(self) -> dict[str, Any]:
-        found: dict[str, Any] = {"name": self.name}
+        plain: dict[str, Any] = {"name": self.name}
         if self.bases is not None:
             rows = zip(self.bases.bases, self.bases.markers, self.bases.displacements.tolist(), strict=True)
-            found["bases"] = [[base, marker, *place] for base, marker, place in rows]
+            plain["bases"] = [[base, marker, *displacement] for base, marker, displacement in rows]
         if self.level is not None:
             level = self.level
-            found["level"] = {"names": list(level.names), "mean": level.mean.tolist(), "spread": level.spread.tolist()}
-        return found
+            plain["level"] = {"names": list(level.names), "mean": level.mean.tolist(), "spread": level.spread.tolist()}
+        return plain
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the signer as JSON, which `read` reads to the last bit; or, as .csv, the bases alone.
@@ -281,8 +283,8 @@ class Signer:
 def _bases(rows: Any, file: Path) -> SignerBases | None:
     if rows is None:
         return None
-    places = np.array([row[2:] for row in rows], dtype=np.float64).reshape(len(rows), 3)
-    return SignerBases(tuple(str(r[0]) for r in rows), tuple(str(r[1]) for r in rows), places, source=str(file))
+    displacements = np.array([row[2:] for row in rows], dtype=np.float64).reshape(len(rows), 3)
+    return SignerBases(tuple(str(r[0]) for r in rows), tuple(str(r[1]) for r in rows), displacements, source=str(file))
 
 
 def _level(content: Mapping[str, Any] | None) -> SignerLevel | None:

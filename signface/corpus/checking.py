@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from signface.corpus.cluster import WorkerDied, on_cores
 from signface.corpus.describing import layout_for, read_entry, recipe_of
-from signface.corpus.manifest import MANIFEST, TakeEntry, read_rows
+from signface.corpus.manifest import TakeEntry, find_manifest, read_rows
 from signface.corpus.origin import Recipe, content_digest, make_recipe, take_name
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
@@ -111,11 +111,7 @@ def check_corpus(
     >>> len(checked.problems)
     0
     """
-    file = Path(path)
-    if file.is_dir():
-        file = file / MANIFEST
-        if not file.is_file():
-            raise SignfaceError(f"has no {MANIFEST}", file=path, hint="name the folder of a corpus")
+    file = find_manifest(path)
     recipe = make_recipe(settings)
     entries, rows = read_rows(file)
     problems = [f"{file}: {problem}" for problem in rows]
@@ -130,22 +126,22 @@ def check_corpus(
             problems.append(f"{entry.path}: {error}")
             solved_as = recipe
         checks.append(TakeCheck(number, entry, solved_as, signers))
-    found: dict[int, CheckedTake] = {}
+    looked_at: dict[int, CheckedTake] = {}
     results = on_cores(check_take, checks, workers=min(workers or os.cpu_count() or 1, max(1, len(checks))))
     for check, result in progress(results, len(checks)):
         if isinstance(result, WorkerDied):
             result = CheckedTake((f"{check.entry.path}: {result}",), 0.0, "")
-        found[check.number] = result
+        looked_at[check.number] = result
     same = defaultdict(list)
     for number, entry in enumerate(entries):
-        problems += found[number].problems
-        if found[number].digest:
-            same[found[number].digest].append(entry)
+        problems += looked_at[number].problems
+        if looked_at[number].digest:
+            same[looked_at[number].digest].append(entry)
     for copies in same.values():
         if len(copies) > 1:
             others = ", ".join(str(entry.path) for entry in copies[1:])
             problems.append(f"{copies[0].path}: holds the same recording as {others}. Leave all but one out")
-    seconds = sum(take.duration for take in found.values())
+    seconds = sum(take.duration for take in looked_at.values())
     annotated = sum(entry.annotation is not None for entry in entries)
     summary = f"{file.parent}: {len(entries)} takes of {len(signers)} signers, {annotated} annotated, {seconds:.0f} s"
     # An annotation that two takes share is looked at twice.
@@ -167,12 +163,12 @@ def _problems_of_names(file: Path, entries: list[TakeEntry]) -> list[str]:
             problems.append(f"{file}: the signers {' and '.join(sorted(variants))} differ in their case only")
     for name, same in names.items():
         if len(same) > 1:
-            own = ", ".join(entry.path.name for entry in same)
-            problems.append(f"{file}: {own} would share the name {name}. Rename one of them")
+            files = ", ".join(entry.path.name for entry in same)
+            problems.append(f"{file}: {files} would share the name {name}. Rename one of them")
     for (annotation, signer, _), same in annotations.items():
         if len(same) > 1:
-            own = ", ".join(entry.path.name for entry in same)
-            problems.append(f"{annotation}: is the annotation of several takes of {signer} ({own})")
+            files = ", ".join(entry.path.name for entry in same)
+            problems.append(f"{annotation}: is the annotation of several takes of {signer} ({files})")
     return problems
 
 
@@ -231,11 +227,9 @@ def _problems_of_reference(entry: TakeEntry, signers: frozenset[str], span: tupl
         tiers = read_tiers(file)
         strangers = sorted({name.removeprefix("affect@") for name in tiers if name.startswith("affect@")} - signers)
         problems += [f"{file}: its tier affect@{name} is of a signer who is not in takes.csv" for name in strangers]
-        own = next((tiers[name] for name in (f"affect@{entry.signer}", "affect") if name in tiers), None)
-        foreign: list[str] = []
-        if own is not None:
-            annotated = tuple(dict.fromkeys(own["label"].str.strip()))
-            foreign = [label for label in annotated if label not in AFFECT.allowed]
+        rows = next((tiers[name] for name in (f"affect@{entry.signer}", "affect") if name in tiers), None)
+        annotated = () if rows is None else tuple(dict.fromkeys(rows["label"].str.strip()))
+        foreign = [label for label in annotated if label not in AFFECT.allowed]
         try:
             reference = read_reference(file, entry.signer)
         except SignfaceError:

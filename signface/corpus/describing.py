@@ -75,9 +75,9 @@ def stored_or_solved(
     SignfaceError
         As `describe_entry`; or the store was written by a newer signface, or cannot be written.
     """
-    found = None if store is None else store.read(origin)
-    if found is not None:
-        return found, False
+    stored = None if store is None else store.read(origin)
+    if stored is not None:
+        return stored, False
     descriptors = describe_entry(entry, origin.recipe, find_signer(folder, entry.signer))
     if store is not None:
         store.write(origin, descriptors)
@@ -114,8 +114,7 @@ def _face(name: str, digest: str) -> FaceModel:
 @lru_cache(maxsize=16)
 def layout_for(recipe: Recipe, labels: tuple[str, ...]) -> MarkerLayout:
     """The layout of a recipe, or the shipped one that fits the labels of a take best."""
-    from signface.face.layout_files import choose_layout, read_layout
+    from signface.solver.solving import face_and_layout
 
     settings = SolveSettings() if recipe.settings is None else recipe.settings
-    face = _face(settings.face, recipe.face_digest)
-    return choose_layout(labels, face) if settings.layout is None else read_layout(settings.layout, face)
+    return face_and_layout(labels, settings, _face(settings.face, recipe.face_digest))[1]

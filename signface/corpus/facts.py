@@ -59,13 +59,13 @@ def corpus_facts(corpus: Corpus, *, settings: SolveSettings | None = None) -> di
             continue
         origin = find_origin(entry, corpus.folder, recipe_of(entry, recipe, known))
         origins.append(origin)
-        own = {"take": origin.take, "signer": origin.signer, "kind": origin.kind}
-        recordings.append(own | {"recording": origin.recording, "annotation": content_digest(entry.annotation)})
-    kinds = Counter(own["kind"] for own in recordings)
+        row = {"take": origin.take, "signer": origin.signer, "kind": origin.kind}
+        recordings.append(row | {"recording": origin.recording, "annotation": content_digest(entry.annotation)})
+    kinds = Counter(row["kind"] for row in recordings)
     return {
         "name": corpus.folder.resolve().name,
         "synthetic": _is_synthetic(corpus.folder),
-        "signers": sorted({own["signer"] for own in recordings}),
+        "signers": sorted({row["signer"] for row in recordings}),
         "kinds": {kind: kinds[kind] for kind in sorted(kinds)},
         "digest": sha256(json.dumps(recordings, sort_keys=True).encode()).hexdigest(),
         "faces": _used(origins, lambda origin: (_name(origin, "face"), origin.recipe.face_digest)),

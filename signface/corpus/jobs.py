@@ -181,8 +181,8 @@ def _annotate(job: Job, notes: list[str]) -> tuple[str, bool, str]:
 def _annotation_key(job: Job, descriptors: str) -> str:
     """SHA-256 of all that an annotation depends on, from the key of the descriptors."""
     video = "" if job.entry.video is None else os.path.relpath(job.entry.video, job.output)
-    parts = [descriptors, job.model, job.code, job.options_digest, job.entry.signer, video, job.signer.level_digest]
-    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+    content = [descriptors, job.model, job.code, job.options_digest, job.entry.signer, video, job.signer.level_digest]
+    return hashlib.sha256("\n".join(content).encode()).hexdigest()
 
 
 def write_log(job: Job, lines: list[str]) -> None:

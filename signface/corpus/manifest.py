@@ -156,10 +156,6 @@ def read_corpus(path: str | PathLike[str]) -> Corpus:
     path : path
         The folder of the corpus or its `takes.csv`.
 
-    Returns
-    -------
-    Corpus
-
     Raises
     ------
     SignfaceError
@@ -172,11 +168,7 @@ def read_corpus(path: str | PathLike[str]) -> Corpus:
     >>> [take.name for take in corpus.select(kinds=["EU"])]
     ['M1_EU_11', 'M2_EU_04']
     """
-    file = Path(path)
-    if file.is_dir():
-        file = file / MANIFEST
-        if not file.is_file():
-            raise SignfaceError(f"has no {MANIFEST}", file=path, hint="name the folder of a corpus")
+    file = find_manifest(path)
     takes, problems = read_rows(file)
     if problems:
         more = len(problems) - SPELT_OUT
@@ -184,6 +176,16 @@ def read_corpus(path: str | PathLike[str]) -> Corpus:
         count = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
         raise SignfaceError(f"{count}: {spelt}", file=file, hint="mend the table")
     return Corpus(file.parent, tuple(takes))
+
+
+def find_manifest(path: str | PathLike[str]) -> Path:
+    """The `takes.csv` of a corpus, from the path of its folder or of the file itself."""
+    file = Path(path)
+    if not file.is_dir():
+        return file
+    if not (file / MANIFEST).is_file():
+        raise SignfaceError(f"has no {MANIFEST}", file=path, hint="name the folder of a corpus")
+    return file / MANIFEST
 
 
 def read_rows(file: Path) -> tuple[list[TakeEntry], list[str]]:
@@ -207,15 +209,15 @@ def read_rows(file: Path) -> tuple[list[TakeEntry], list[str]]:
         if len(cells) > len(header):
             problems.append(f"line {line}: has {len(cells)} cells for {len(header)} columns")
         row = dict(zip(header, cells))
-        take, own = _read_row(row, file.parent)
-        problems.extend(f"line {line}: {problem}" for problem in own)
+        take, wrong = _read_row(row, file.parent)
+        problems.extend(f"line {line}: {problem}" for problem in wrong)
         if take is None:
             continue
-        place = take.path.resolve()
-        if place in first_line:
-            problems.append(f"line {line}: the take {row['take']} is already on line {first_line[place]}")
+        recording = take.path.resolve()
+        if recording in first_line:
+            problems.append(f"line {line}: the take {row['take']} is already on line {first_line[recording]}")
             continue
-        first_line[place] = line
+        first_line[recording] = line
         takes.append(take)
     return takes, problems
 

@@ -23,7 +23,7 @@ from typing import Any
 from signface.corpus.manifest import TakeEntry
 from signface.corpus.signers import find_signer
 from signface.errors import SignfaceError
-from signface.files import shipped
+from signface.files import reading, shipped
 from signface.settings.solve import SolveSettings
 
 #: The modules between a recording and its descriptors.
@@ -178,7 +178,7 @@ def take_name(entry: TakeEntry, folder: Path) -> str:
     'S1/laugh'
     """
     relative = Path(os.path.relpath(entry.path, folder)).with_suffix("")
-    return "/".join("up" if part == os.pardir else part for part in relative.parts)
+    return "/".join("up" if step == os.pardir else step for step in relative.parts)
 
 
 def content_digest(path: Path) -> str:
@@ -189,16 +189,12 @@ def content_digest(path: Path) -> str:
     SignfaceError
         There is no such file, or it cannot be read.
     """
-    try:
+    with reading(path):
         if path.is_dir():
             files = sorted(file for file in path.rglob("*") if file.is_file())
             return _digest_of([[file.relative_to(path).as_posix(), content_digest(file)] for file in files])
         with path.open("rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()
-    except FileNotFoundError as error:
-        raise SignfaceError("no such file", file=path) from error
-    except OSError as error:
-        raise SignfaceError(f"cannot be read ({error.strerror})", file=path) from error
 
 
 def shipped_digest(kind: str, suffix: str, name: str) -> str:

@@ -18,7 +18,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from signface.channels.rules import read_channels
 from signface.corpus.cluster import WorkerDied, on_cluster, on_cores
@@ -33,9 +33,6 @@ from signface.errors import SignfaceError
 from signface.settings.eaf import EafOptions
 from signface.settings.solve import SolveSettings
 from signface.signer import Signer
-
-if TYPE_CHECKING:
-    pass
 
 #: Where annotations go when nothing else is said, in the folder of the corpus.
 ANNOTATED = "annotated"
@@ -150,14 +147,12 @@ def plan_jobs(
                 hint="rename one of the recordings",
             )
         try:
-            own = recipe_of(entry, recipe, known)
+            solved_as = recipe_of(entry, recipe, known)
         except SignfaceError as error:
             failed.append(Outcome(name, FAILED, message=f"{entry.path}: {error}"))
             continue
-        signer = Signer(entry.signer)
-        jobs[name] = Job(
-            _absolute(entry), folder, output, own, classifier, model, code, options, options_digest, signer
-        )
+        what = (classifier, model, code, options, options_digest, Signer(entry.signer))
+        jobs[name] = Job(_absolute(entry), folder, output, solved_as, *what)
     return list(jobs.values()), failed
 
 
@@ -213,10 +208,10 @@ def clean_output(output: Path, jobs: list[Job]) -> None:
     """Remove what a killed run left half written beside the files of these jobs (`signface.files.whole_file`)."""
     ours = {job.eaf.with_name(name) for job in jobs for name in _names_of(job)} | {job.log for job in jobs}
     for folder in {file.parent for file in ours}:
-        for part in folder.glob(".*"):
-            found = re.fullmatch(r"\.(.+)-[a-z0-9_]{8}(\.[a-z]+)", part.name)
-            if found and folder / (found[1] + found[2]) in ours:
-                part.unlink(missing_ok=True)
+        for file in folder.glob(".*"):
+            match = re.fullmatch(r"\.(.+)-[a-z0-9_]{8}(\.[a-z]+)", file.name)
+            if match and folder / (match[1] + match[2]) in ours:
+                file.unlink(missing_ok=True)
 
 
 def _names_of(job: Job) -> list[str]:

@@ -29,7 +29,7 @@ from signface.descriptors import Descriptors
 from signface.descriptors_files import NewerFile, WeightsWriter, read_about, read_parquet
 from signface.errors import SignfaceError
 from signface.extras import needed
-from signface.files import bundled_corpus
+from signface.files import bundled_corpus, reading
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -130,10 +130,10 @@ class DescriptorStore:
 
     def clean(self) -> None:
         """Remove what processes of this machine that were killed left half written."""
-        for part in self.folder.glob("**/.*.part"):
-            host, _, process = part.stem.rpartition("-")[0].rpartition("~")[2].rpartition("@")
+        for file in self.folder.glob("**/.*.part"):
+            host, _, process = file.stem.rpartition("-")[0].rpartition("~")[2].rpartition("@")
             if host == socket.gethostname() and process.isdecimal() and not _alive(int(process)):
-                part.unlink(missing_ok=True)
+                file.unlink(missing_ok=True)
 
     def query(self, sql: str, recipe: str | None = None) -> pd.DataFrame:
         """Ask with SQL; the table is called `descriptors`.
@@ -165,12 +165,12 @@ class DescriptorStore:
         3   M2_SE_A    1758
         """
         duckdb = needed("duckdb", "corpus")
-        there = [path.name for path in self.recipes()]
-        if recipe is None and len(there) == 1:
-            recipe = there[0]
-        if recipe not in there:
-            problem = "is empty" if not there else f"has the recipes {', '.join(there)}"
-            hint = "fill it with: signface corpus run CORPUS" if not there else "name one of them"
+        recipes = [path.name for path in self.recipes()]
+        if recipe is None and len(recipes) == 1:
+            recipe = recipes[0]
+        if recipe not in recipes:
+            problem = "is empty" if not recipes else f"has the recipes {', '.join(recipes)}"
+            hint = "fill it with: signface corpus run CORPUS" if not recipes else "name one of them"
             raise SignfaceError(problem, file=self.folder, hint=hint)
         pattern = str(self.folder / str(recipe) / "**" / "*.parquet")
         with duckdb.connect() as connection:
@@ -215,12 +215,8 @@ def read_provenance(path: str | PathLike[str]) -> dict[str, Any]:
 
 def _opened(file: Path) -> BinaryIO:
     """The file, opened once: another writer may replace it at any moment."""
-    try:
+    with reading(file):
         return file.open("rb")
-    except FileNotFoundError as error:
-        raise SignfaceError("no such file", file=file) from error
-    except OSError as error:
-        raise SignfaceError(f"cannot be read ({error.strerror})", file=file) from error
 
 
 def _provenance(stream: BinaryIO, file: Path) -> dict[str, Any]:

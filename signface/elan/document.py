@@ -66,9 +66,9 @@ def read_document(path: str | PathLike[str]) -> etree._ElementTree:
     root = tree.getroot()
     if root.tag != "ANNOTATION_DOCUMENT":
         raise SignfaceError(f"is XML but no EAF (its root is {root.tag})", file=file)
-    for part in ("HEADER", "TIME_ORDER"):
-        if root.find(part) is None:
-            raise SignfaceError(f"is no complete EAF (no {part})", file=file)
+    for tag in ("HEADER", "TIME_ORDER"):
+        if root.find(tag) is None:
+            raise SignfaceError(f"is no complete EAF (no {tag})", file=file)
     for slot in root.iterfind("TIME_ORDER/TIME_SLOT"):
         value = slot.get("TIME_VALUE")
         if value is not None and not value.strip().isdecimal():

@@ -273,7 +273,7 @@ def _tier_name(root: etree._Element, wanted: str, signer: str | None, file: Path
     tiers = {tier.get("TIER_ID") or "": tier for tier in root.iterfind("TIER")}
     labs = [name for name, (channel, _) in channel_labels(root).items() if channel == wanted and name in tiers]
     ours = [name for name in tiers if name == wanted or name.startswith(f"{wanted}@")]
-    there = f"its tiers are {', '.join(list(tiers)[:12]) or 'none'}"
+    hint = f"its tiers are {', '.join(list(tiers)[:12]) or 'none'}"
     if signer:
         of_signer = [name for name in labs if tiers[name].get("PARTICIPANT") == clean_name(signer)]
         for name in (tier_name(wanted, signer), wanted):
@@ -281,7 +281,7 @@ def _tier_name(root: etree._Element, wanted: str, signer: str | None, file: Path
                 return name
         if len(of_signer) == 1 or len(labs) == 1:
             return (of_signer or labs)[0]
-        raise SignfaceError(f"no tier {wanted}@{signer} or {wanted}", file=file, hint=there)
+        raise SignfaceError(f"no tier {wanted}@{signer} or {wanted}", file=file, hint=hint)
     if wanted in ours:
         return wanted
     candidates = ours or labs
@@ -289,7 +289,7 @@ def _tier_name(root: etree._Element, wanted: str, signer: str | None, file: Path
         return candidates[0]
     if candidates:
         raise SignfaceError(f"has several {wanted} tiers: {', '.join(candidates)}", file=file, hint="name the signer")
-    raise SignfaceError(f"no tier {wanted} or {wanted}@SIGNER", file=file, hint=there)
+    raise SignfaceError(f"no tier {wanted} or {wanted}@SIGNER", file=file, hint=hint)
 
 
 def _fill_times(root: etree._Element) -> None:

@@ -132,19 +132,19 @@ def _from_text(file: Path) -> Vocabulary:
 def _chosen(root: etree._Element, tier: str | None, name: str | None, file: Path) -> etree._Element:
     """The vocabulary's element: that of the tier, of the name, or the only one."""
     elements = {element.get("CV_ID") or "": element for element in root.iterfind("CONTROLLED_VOCABULARY")}
-    there = f"its vocabularies are {', '.join(elements)}" if elements else "it has no vocabulary"
+    hint = f"its vocabularies are {', '.join(elements)}" if elements else "it has no vocabulary"
     if tier is not None and root.tag != "CV_RESOURCE":
         tiers = [element.get("TIER_ID") or "" for element in root.iterfind("TIER")]
         if tier not in tiers:
             raise SignfaceError(f"has no tier {tier}", file=file, hint=f"its tiers are {', '.join(tiers) or 'none'}")
         name = vocabulary_name(root, named(root, "TIER", tier))
         if name is None:
-            raise SignfaceError(f"its tier {tier} has no closed vocabulary", file=file, hint=there)
+            raise SignfaceError(f"its tier {tier} has no closed vocabulary", file=file, hint=hint)
     if name is None and len(elements) != 1:
-        raise SignfaceError("has several vocabularies" if elements else "has no vocabulary", file=file, hint=there)
+        raise SignfaceError("has several vocabularies" if elements else "has no vocabulary", file=file, hint=hint)
     element = elements.get(name) if name is not None else next(iter(elements.values()))
     if element is None:
-        raise SignfaceError(f"has no vocabulary {name}", file=file, hint=there)
+        raise SignfaceError(f"has no vocabulary {name}", file=file, hint=hint)
     return element
 
 

@@ -24,6 +24,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from signface.content import Content
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.layout_files import read_layout
@@ -123,8 +124,8 @@ class Cell:
     errors: tuple[Errors, ...] = field(repr=False)
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, eq=False)
+class Comparison(Content):
     """What a comparison found.
 
     Parameters

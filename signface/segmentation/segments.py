@@ -125,8 +125,8 @@ class Segments(Content):
         edges = [start, *self.table["end_s"]], [*self.table["start_s"], end]
         gaps = [(a, b, "stable", label) for a, b in zip(*edges, strict=True) if b - a >= LEAST_GAP_S]
         columns = ["start_s", "end_s", "kind", "label"]
-        parts = [self.table, pd.DataFrame(gaps, columns=columns)] if gaps else [self.table]
-        table = pd.concat(parts, ignore_index=True).sort_values("start_s", kind="stable", ignore_index=True)
+        tables = [self.table, pd.DataFrame(gaps, columns=columns)] if gaps else [self.table]
+        table = pd.concat(tables, ignore_index=True).sort_values("start_s", kind="stable", ignore_index=True)
         return self.changed(f"filled with {label}", table)
 
     def changed(self, operation: str, table: pd.DataFrame) -> Segments:

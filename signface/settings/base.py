@@ -2,7 +2,7 @@
 
 - `Settings`: what they share. A frozen dataclass whose fields say, in their metadata, what the command line and a
   laboratory's TOML call them; validated once, when it is made.
-- `option`: a field of one.
+- `option`: a field of one; `number`: one that may be None, for the usual value.
 
 The decisions: `solve.SolveSettings`, `training.TrainingSettings`, `eaf.EafOptions`; `laboratory` reads a TOML of them.
 """
@@ -14,6 +14,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, Field, field, fields, replace
+from functools import partial
 from os import PathLike
 from typing import Any, Self
 
@@ -53,18 +54,15 @@ def option(
     bare : str, optional
         What the option stands for on the command line when no value follows it.
     """
-    about = {
-        "help": help,
-        "kind": kind,
-        "choices": tuple(choices),
-        "flag": flag,
-        "metavar": metavar,
-        "path": path,
-        "bare": bare,
-    }
+    about = {"help": help, "kind": kind, "choices": tuple(choices), "flag": flag}
+    about |= {"metavar": metavar, "path": path, "bare": bare}
     if default_factory is not MISSING:
         return field(default_factory=default_factory, metadata=about)
     return field(default=default, metadata=about)
+
+
+#: An `option` that is a number, or None for the usual one.
+number = partial(option, None, kind=float)
 
 
 class Settings:
@@ -98,8 +96,8 @@ class Settings:
 
     def as_dict(self) -> dict[str, Any]:
         """Every field as a plain value, for JSON and TOML."""
-        found = {item.name: getattr(self, item.name) for item in fields(self)}  # type: ignore[arg-type]
-        return {name: list(value) if isinstance(value, tuple) else value for name, value in found.items()}
+        values = {item.name: getattr(self, item.name) for item in fields(self)}  # type: ignore[arg-type]
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any], *, file: str | PathLike[str] | None = None) -> Self:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from signface.errors import SignfaceError
-from signface.files import shipped
-from signface.settings.base import Settings, option
+from signface.files import reading, shipped
+from signface.settings.base import Settings, number, option
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,8 @@ class EafOptions(Settings):
         bare="default",
         path=True,
     )
-    doubtful: float | None = option(
-        None,
-        help="also a tier with the segments whose confidence is below this, 0 to 1",
-        kind=float,
-        metavar="CONFIDENCE",
+    doubtful: float | None = number(
+        help="also a tier with the segments whose confidence is below this, 0 to 1", metavar="CONFIDENCE"
     )
     curves: bool = option(True, help="also write the curves of ELAN's timeseries viewer", kind=bool)
     author: str = option("signface", help="who the file says made it", metavar="NAME")
@@ -77,10 +74,8 @@ class EafOptions(Settings):
         """
         values = self.as_dict()
         for name, file in self._files().items():
-            try:
+            with reading(Path(file)):
                 values[name] = hashlib.sha256(Path(file).read_bytes()).hexdigest()
-            except OSError as error:
-                raise SignfaceError(f"cannot be read ({error.strerror})", file=file) from error
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
     def _files(self) -> dict[str, str]:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from signface.errors import SignfaceError
+from signface.files import reading
 from signface.settings.base import Settings
 from signface.settings.eaf import EafOptions
 from signface.settings.solve import SolveSettings
@@ -54,10 +55,9 @@ def read_settings(path: str | PathLike[str], usual: Laboratory | None = None) ->
     """
     file = Path(path)
     try:
-        content = tomllib.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise SignfaceError("no such file", file=file) from error
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        with reading(file):
+            content = tomllib.loads(file.read_text(encoding="utf-8"))
+    except tomllib.TOMLDecodeError as error:
         raise SignfaceError(f"cannot be read as TOML ({error})", file=file) from error
     tables: dict[str, type[Settings]] = {"solve": SolveSettings, "train": TrainingSettings, "eaf": EafOptions}
     for name, table in content.items():
@@ -73,9 +73,8 @@ def read_settings(path: str | PathLike[str], usual: Laboratory | None = None) ->
 
 def _with_paths(kind: type[Settings], values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """The values, with paths that exist beside the TOML made its folder's."""
-    found = dict(values)
-    for item in fields(kind):  # type: ignore[arg-type]
-        value = found.get(item.name)
-        if item.metadata.get("path") and isinstance(value, str) and (folder / value).exists():
-            found[item.name] = str(folder / value)
-    return found
+    paths = {item.name for item in fields(kind) if item.metadata.get("path")}  # type: ignore[arg-type]
+    return {
+        name: str(folder / value) if name in paths and isinstance(value, str) and (folder / value).exists() else value
+        for name, value in values.items()
+    }

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from signface.errors import SignfaceError
-from signface.settings.base import Settings, option
+from signface.settings.base import Settings, number, option
 
 #: name: what it is, for `--help` and reports.
 METHODS = {
@@ -66,41 +66,27 @@ class SolveSettings(Settings):
         "auto", help="time of a frame with a neutral face, or auto", kind=object, metavar="SECONDS"
     )
     method: str = option("thin-shell", help="how weights are solved", choices=tuple(METHODS), metavar="METHOD")
-    alpha: float | None = option(
-        None, help="weight of the thin shell, 0 to 1 (default: the method's own)", kind=float, metavar="A"
-    )
+    alpha: float | None = number(help="weight of the thin shell, 0 to 1 (default: the method's own)", metavar="A")
     adaptation: str = option(
         "similarity", help="how displacements are carried to the avatar", choices=("similarity", "rbf")
     )
-    sparsity: float | None = option(None, help="pull towards rest, 0 or more (default: 0.006)", kind=float, metavar="S")
-    head_slack: float | None = option(
-        None, help="how far head markers may creep, 0 trusts them (default: 0.3)", kind=float, metavar="H"
-    )
-    slip: float | None = option(
-        None,
+    sparsity: float | None = number(help="pull towards rest, 0 or more (default: 0.006)", metavar="S")
+    head_slack: float | None = number(help="how far head markers may creep, 0 trusts them (default: 0.3)", metavar="H")
+    slip: float | None = number(
         help="how far off a marker counts in full, beside a typical displacement; 0 trusts all (default: 0.4)",
-        kind=float,
         metavar="D",
     )
     creep: bool | None = option(
         None, help="do not take away what the markers creep on the skin", kind=bool, flag="--keep-creep"
     )
-    short_gap_s: float | None = option(
-        None,
-        help="longest gap that a spline fills (default: 0.05 s)",
-        kind=float,
-        flag="--short-gap",
-        metavar="SECONDS",
+    short_gap_s: float | None = number(
+        help="longest gap that a spline fills (default: 0.05 s)", flag="--short-gap", metavar="SECONDS"
     )
-    long_gap_s: float | None = option(
-        None,
-        help="longest gap that neighbouring markers fill (default: 0.5 s)",
-        kind=float,
-        flag="--long-gap",
-        metavar="SECONDS",
+    long_gap_s: float | None = number(
+        help="longest gap that neighbouring markers fill (default: 0.5 s)", flag="--long-gap", metavar="SECONDS"
     )
-    cutoff_hz: float | None = option(
-        None, help="what changes faster is filtered out (default: 12 Hz)", kind=float, flag="--cutoff", metavar="HZ"
+    cutoff_hz: float | None = number(
+        help="what changes faster is filtered out (default: 12 Hz)", flag="--cutoff", metavar="HZ"
     )
     filter_method: str = option(
         "butterworth", help="the filter", choices=("butterworth", "raised-sine"), flag="--filter"

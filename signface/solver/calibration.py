@@ -67,10 +67,10 @@ def calibrate(
         raise SignfaceError(
             f"only {seen.sum()} frames of the calibration take show all markers", hint="record a longer one"
         )
-    marked, shown, slow = displacements[seen].reshape(seen.sum(), -1), weights[seen], slow[seen]
+    marked, weights, slow = displacements[seen].reshape(seen.sum(), -1), weights[seen], slow[seen]
     projection = np.linalg.pinv(slow)
-    marked, shown = (values - slow @ (projection @ values) for values in (marked, shown))
+    marked, weights = (values - slow @ (projection @ values) for values in (marked, weights))
     known = bases.reshape(count, -1)
-    normal = shown.T @ shown / len(shown) + prior * np.eye(count)
-    solved = np.linalg.solve(normal, shown.T @ marked / len(shown) + prior * known)
+    normal = weights.T @ weights / len(weights) + prior * np.eye(count)
+    solved = np.linalg.solve(normal, weights.T @ marked / len(weights) + prior * known)
     return solved.reshape(bases.shape)

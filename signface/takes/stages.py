@@ -17,13 +17,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from signface.content import Content
 from signface.frames import Timed
 from signface.takes.recording import PIECE, Recording, pieces
 from signface.takes.take import Take
 
 
-@dataclass(frozen=True)
-class Block:
+@dataclass(frozen=True, eq=False)
+class Block(Content):
     """Frames of a recording on their way through stages.
 
     Parameters

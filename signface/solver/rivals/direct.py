@@ -74,5 +74,5 @@ class ThinShellDeformation:
     def _forces(self, pattern: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """(F, p, 3) forces at the markers present that carry them where they are."""
         inner = self._at_markers[np.ix_(pattern, pattern)]
-        there = rows.reshape(len(rows), -1, 3)[:, pattern]
-        return np.einsum("pq,fqd->fpd", np.linalg.inv(inner), there, optimize=True)
+        moved = rows.reshape(len(rows), -1, 3)[:, pattern]
+        return np.einsum("pq,fqd->fpd", np.linalg.inv(inner), moved, optimize=True)

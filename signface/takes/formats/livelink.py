@@ -35,19 +35,19 @@ def _frames(cells: list[str], file: Path) -> tuple[np.ndarray, float]:
     wrong = next((row for row, match in enumerate(matches) if match is None), None)
     if wrong is not None:
         raise SignfaceError(f"row {wrong + 2} has no timecode ({cells[wrong][:20]!r})", file=file)
-    parts = np.array([[float(part or 0) for part in match.groups()] for match in matches if match])
-    if len(parts) < 2:
+    fields = np.array([[float(field or 0) for field in match.groups()] for match in matches if match])
+    if len(fields) < 2:
         raise SignfaceError("has one frame, and a rate needs two", file=file, hint="export more of the recording")
-    seconds = parts[:, :3] @ (3600.0, 60.0, 1.0)
+    seconds = fields[:, :3] @ (3600.0, 60.0, 1.0)
     # Within a second the frame numbers rise to the rate less one. A take within one second does not show it.
-    highest = parts[:, 3].max() + 1
+    highest = fields[:, 3].max() + 1
     least = highest if (np.diff(seconds) > 0).any() else max(highest, USUAL_RATE)
     counted = min((rate for rate in USUAL_RATES if rate >= least), default=highest)
-    whole = seconds * counted + parts[:, 3]
+    whole = seconds * counted + fields[:, 3]
     if (np.diff(whole) > 0).mean() > 0.9:
         frames, rate = whole, counted  # the parts of frames only say how far the camera runs beside the clock
     else:
-        times = seconds + (parts[:, 3] + parts[:, 4]) / counted
+        times = seconds + (fields[:, 3] + fields[:, 4]) / counted
         step = float(np.median(np.diff(times)))
         if step <= 0:
             raise SignfaceError("its timecodes do not rise", file=file, hint="export it again")
