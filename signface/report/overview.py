@@ -81,8 +81,8 @@ def telling_frames(descriptors: Descriptors, segments: Segments, most: int) -> l
     rest = table.drop(chosen.index).head(most - len(chosen))
     solved = np.flatnonzero(np.isfinite(descriptors.weights).all(axis=1))
     frames = []
-    for place in sorted([*chosen.index, *rest.index]):
-        row = table.loc[place]
+    for segment in sorted([*chosen.index, *rest.index]):
+        row = table.loc[segment]
         middle = (row["start_s"] + row["end_s"]) / 2
         if len(solved):
             frames.append((int(solved[np.argmin(np.abs(descriptors.time[solved] - middle))]), str(row["label"])))

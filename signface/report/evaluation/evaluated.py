@@ -78,7 +78,7 @@ class Evaluated:
     @cached_property
     def verdicts(self) -> list[TakeVerdict]:
         """What the best classifier made of each test take under the main protocol, the worst first."""
-        own = next(iter(self.found.values()))[self.best]
+        labelled = next(iter(self.found.values()))[self.best]
         residuals = [
             float(np.nanmean(example.descriptors.residual))
             for example in self.examples
@@ -88,7 +88,7 @@ class Evaluated:
         judged = [
             judge_take(
                 e.reference,
-                own[e.take],
+                labelled[e.take],
                 e.descriptors,
                 take=e.take,
                 signer=e.signer,
@@ -97,7 +97,7 @@ class Evaluated:
                 vocabulary=e.vocabulary,
             )
             for e in self.examples
-            if e.take in own
+            if e.take in labelled
         ]
         return sorted(judged, key=lambda verdict: (np.nan_to_num(verdict.agreement, nan=2.0), verdict.take))
 
@@ -110,8 +110,8 @@ class Evaluated:
     def gallery(self) -> list[TakeVerdict]:
         """Some of the others, from good to bad, evenly spaced."""
         rest = self.verdicts[len(self.worst) :][::-1]
-        places = np.unique(np.linspace(0, len(rest) - 1, min(GALLERY, len(rest))).round().astype(int))
-        return [rest[place] for place in places]
+        positions = np.unique(np.linspace(0, len(rest) - 1, min(GALLERY, len(rest))).round().astype(int))
+        return [rest[position] for position in positions]
 
 
 @dataclass(frozen=True)

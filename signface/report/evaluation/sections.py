@@ -24,7 +24,7 @@ Content = tuple[list[str], list[dict[str, Any]]]
 
 def labels(evaluated: Evaluated) -> Content:
     """Accuracies, by protocol."""
-    shown = []
+    page_tables = []
     for protocol, part in evaluated.parts.items():
         table = tables.results_table(part["classifiers"])
         table["95 %"] = [_interval(low, high) for low, high in zip(table["low"], table["high"], strict=True)]
@@ -43,7 +43,7 @@ def labels(evaluated: Evaluated) -> Content:
         if any(left_out.values()):
             counts = ", ".join(f"{name} {count}" for name, count in left_out.items())
             notes.append(f"Automatic segments that lie in a transition of the reference and are not counted: {counts}.")
-        shown.append(page_table(table[columns], f"results-{protocol}", title.capitalize(), notes=notes))
+        page_tables.append(page_table(table[columns], f"results-{protocol}", title.capitalize(), notes=notes))
     paragraphs = [
         "Manual segments are the annotator’s: only the label is asked. On automatic segments, errors of the "
         "segmentation are added to those of the label. Frames are the whole annotation, transitions included."
@@ -53,7 +53,7 @@ def labels(evaluated: Evaluated) -> Content:
             "Sequence models find segments of their own: on automatic segments they are not asked the same "
             "questions as the others. Compare them on frames."
         )
-    return paragraphs, shown
+    return paragraphs, page_tables
 
 
 def segmentation(evaluated: Evaluated) -> Content:
@@ -86,7 +86,7 @@ def segmentation(evaluated: Evaluated) -> Content:
 
 def confusions(evaluated: Evaluated) -> Content:
     """Every confusion matrix."""
-    shown = []
+    page_tables = []
     for protocol, part in evaluated.parts.items():
         for name, sections in part["classifiers"].items():
             for section, title in tables.SECTIONS.items():
@@ -94,49 +94,49 @@ def confusions(evaluated: Evaluated) -> Content:
                 matrix = pd.DataFrame(scores["confusion"], columns=scores["labels"])
                 matrix.insert(0, "reference \\ found", scores["labels"])
                 caption = f"{name}, {title}, {tables.PROTOCOL_TITLES.get(protocol, protocol)}"
-                shown.append(page_table(matrix, f"confusion-{protocol}-{name}-{section}", caption))
-    return [_most_confused(evaluated)], shown
+                page_tables.append(page_table(matrix, f"confusion-{protocol}-{name}-{section}", caption))
+    return [_most_confused(evaluated)], page_tables
 
 
 def _most_confused(evaluated: Evaluated) -> str:
     """The commonest mistake of the best classifier, in words."""
     scores = evaluated.metrics["classifiers"][evaluated.best]["automatic_segments"]
     mistakes = [
-        (count, evaluated.vocabulary.describe(truth), evaluated.vocabulary.describe(said))
+        (count, evaluated.vocabulary.describe(truth), evaluated.vocabulary.describe(called))
         for truth, row in zip(scores["labels"], scores["confusion"], strict=True)
-        for said, count in zip(scores["labels"], row, strict=True)
-        if truth != said and count
+        for called, count in zip(scores["labels"], row, strict=True)
+        if truth != called and count
     ]
     if not mistakes:
         return f"“{evaluated.best}” takes no expression for another on automatic segments."
     spelt_out = ", ".join(
-        f"{truth} for {said} ({count} {'segment' if count == 1 else 'segments'})"
-        for count, truth, said in sorted(mistakes, reverse=True)[:3]
+        f"{truth} for {called} ({count} {'segment' if count == 1 else 'segments'})"
+        for count, truth, called in sorted(mistakes, reverse=True)[:3]
     )
     return f"What “{evaluated.best}” takes for something else most often on automatic segments: {spelt_out}."
 
 
 def signers(evaluated: Evaluated) -> Content:
     """Accuracies of each signer."""
-    shown = []
+    page_tables = []
     for protocol, part in evaluated.parts.items():
         table = tables.by_signer_table(part["protocol"])
         for title in tables.SECTIONS.values():
             bounds = zip(table.pop(f"{title} low"), table.pop(f"{title} high"), strict=True)
-            place = table.columns.get_loc(title)
-            assert isinstance(place, int)
-            table.insert(place + 1, f"95 % ({title.split()[0]})", [_interval(low, high) for low, high in bounds])
+            column = table.columns.get_loc(title)
+            assert isinstance(column, int)
+            table.insert(column + 1, f"95 % ({title.split()[0]})", [_interval(low, high) for low, high in bounds])
         title = tables.PROTOCOL_TITLES.get(protocol, protocol)
-        shown.append(page_table(table, f"signers-{protocol}", title.capitalize()))
+        page_tables.append(page_table(table, f"signers-{protocol}", title.capitalize()))
     signers = {fold["signer"] for fold in evaluated.metrics["protocol"]["folds"]}
     if len(signers) == 1:
-        return ["One signer was tested, so that this repeats the numbers above."], shown
-    return ["How much accuracies differ from signer to signer tells more than any interval over takes."], shown
+        return ["One signer was tested, so that this repeats the numbers above."], page_tables
+    return ["How much accuracies differ from signer to signer tells more than any interval over takes."], page_tables
 
 
 def comparison(evaluated: Evaluated) -> Content:
     """McNemar's test of each two classifiers."""
-    shown = [
+    page_tables = [
         page_table(
             tables.mcnemar_table(part["mcnemar"]).assign(p=[_probability(pair["p"]) for pair in part["mcnemar"]]),
             f"mcnemar-{protocol}",
@@ -145,14 +145,14 @@ def comparison(evaluated: Evaluated) -> Content:
         for protocol, part in evaluated.parts.items()
         if part["mcnemar"]
     ]
-    if not shown:
+    if not page_tables:
         return ["There is one classifier only, with nothing to compare it with."], []
     pairs = len(evaluated.metrics["mcnemar"])
     several = f" With {pairs} pairs, one in twenty falls below 0.05 by chance alone." if pairs > 5 else ""
     return [
         "Segments that only one of two classifiers labels rightly. Segments of one take are alike, so that p is "
         "smaller than it should be: read it beside the intervals over takes." + several
-    ], shown
+    ], page_tables
 
 
 def confidence(evaluated: Evaluated) -> Content:
@@ -176,16 +176,16 @@ def confidence(evaluated: Evaluated) -> Content:
             kept = {key.replace("_", " "): value for key, value in scores.items() if isinstance(value, int | float)}
             intensities.append({"intensity by": how, "": title, **kept})
         for fold in part["protocol"]["folds"]:
-            for name, own in fold.get("trained", {}).items():
-                if own.get("parameters"):
-                    chosen = ", ".join(f"{key} {value}" for key, value in own["parameters"].items())
+            for name, training in fold.get("trained", {}).items():
+                if training.get("parameters"):
+                    chosen = ", ".join(f"{key} {value}" for key, value in training["parameters"].items())
                     parameters.append({"classifier": name, "signer": fold["signer"], "": title, "chosen": chosen})
     paragraphs = [
         "A confidence of 0.8 should be right eight times in ten. The expected calibration error is the mean distance "
         "from that; the Brier score, the mean squared distance of the confidence from right (1) or wrong (0), also "
         "rewards being sure where that is deserved. Lower is better for both."
     ]
-    shown = [
+    page_tables = [
         page_table(
             pd.DataFrame(rows),
             "calibration",
@@ -198,11 +198,11 @@ def confidence(evaluated: Evaluated) -> Content:
             "Intensity (1 to 3) of the annotator’s segments, given their labels: learnt from the training takes, and "
             "by the rule that needs no training."
         )
-        shown.append(page_table(pd.DataFrame(intensities), "intensity", "Intensity"))
+        page_tables.append(page_table(pd.DataFrame(intensities), "intensity", "Intensity"))
     if parameters:
         paragraphs.append("Parameters were searched within the training takes of each signer.")
-        shown.append(page_table(pd.DataFrame(parameters), "parameters", "Parameters chosen"))
-    return paragraphs, shown
+        page_tables.append(page_table(pd.DataFrame(parameters), "parameters", "Parameters chosen"))
+    return paragraphs, page_tables
 
 
 def curve(evaluated: Evaluated) -> Content:
@@ -213,7 +213,7 @@ def curve(evaluated: Evaluated) -> Content:
         paragraphs.append(
             "Each classifier was trained on growing parts of the training takes, in several random orders."
         )
-    shown = []
+    page_tables = []
     for protocol, points in curves.items():
         table = pd.DataFrame(points)
         if not len(table):
@@ -232,7 +232,7 @@ def curve(evaluated: Evaluated) -> Content:
                 f"{title.capitalize()}: from {mean.columns[0]} to {mean.columns[-1]} training {by}: {', '.join(gains)}."
             )
         mean.columns = [f"{size} {by if size > 1 else by.removesuffix('s')}" for size in mean.columns]
-        shown.append(page_table(mean.reset_index(), f"curve-{protocol}", f"Mean accuracy, {title}"))
+        page_tables.append(page_table(mean.reset_index(), f"curve-{protocol}", f"Mean accuracy, {title}"))
     left_out = [
         name
         for name in evaluated.metrics["classifiers"]
@@ -242,12 +242,12 @@ def curve(evaluated: Evaluated) -> Content:
         paragraphs.append(
             f"Without a curve, since training takes long: {', '.join(left_out)} (--learning-curve draws it)."
         )
-    return paragraphs, shown
+    return paragraphs, page_tables
 
 
 def importance(evaluated: Evaluated) -> Content:
     """What each classifier loses without each base."""
-    shown = []
+    page_tables = []
     for name, rows in evaluated.metrics["importance"].items():
         table = pd.DataFrame(rows)
         table["95 %"] = [_interval(low, high) for low, high in zip(table.pop("low"), table.pop("high"), strict=True)]
@@ -257,7 +257,7 @@ def importance(evaluated: Evaluated) -> Content:
             | {label: label.removeprefix("lost_") for label in labels}
         )
         note = "The last columns: share of the segments of each label that are lost with the base."
-        shown.append(
+        page_tables.append(
             page_table(
                 table,
                 f"importance-{name}",
@@ -276,7 +276,7 @@ def importance(evaluated: Evaluated) -> Content:
         paragraphs.append(
             f"Not asked of {', '.join(without)}: what does not label a segment by its mean weights has no such answer."
         )
-    return paragraphs, shown
+    return paragraphs, page_tables
 
 
 def _probability(p: float) -> str:
