@@ -1,13 +1,15 @@
-"""`Content`: equality by what an object holds, for the frozen dataclasses over arrays.
+"""What the frozen dataclasses over arrays have in common.
 
-Python's own equality of dataclasses compares fields with `==`, which arrays answer element by element.
+- `Content`: equality by what an object holds. Python's own compares fields with `==`, which arrays answer element by
+  element.
+- `Summary`: an object in a few words, where Python would print all its arrays.
 """
 
 from __future__ import annotations
 
 import sys
 from dataclasses import fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -46,6 +48,28 @@ class Content:
 
     def __hash__(self) -> int:
         return hash((type(self), *map(_key, _contents(self))))
+
+
+class Summary:
+    """An object that has a name is shown by it and by its sizes, which `_sizes` tells; for dataclasses with `repr=False`.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> sf.datasets.mini_take()
+    <Take M2_EU_04: 1184 frames at 200 Hz, 46 markers>
+    """
+
+    if TYPE_CHECKING:
+
+        @property
+        def name(self) -> str: ...
+
+    def _sizes(self) -> str:
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name}: {self._sizes()}>"
 
 
 def _contents(thing: Any) -> list[Any]:

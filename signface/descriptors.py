@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from signface.columns import RESIDUAL, TIME, base_column, pose_columns
-from signface.content import Content
+from signface.content import Content, Summary
 from signface.errors import SignfaceError
 from signface.extras import needed
 from signface.frames import TimedArrays
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from signface.settings.solve import SolveSettings
 
 
-@dataclass(frozen=True, eq=False)
-class Descriptors(TimedArrays, Content):
+@dataclass(frozen=True, eq=False, repr=False)
+class Descriptors(TimedArrays, Summary, Content):
     """Blendshape weights of a take.
 
     Parameters
@@ -82,6 +82,9 @@ class Descriptors(TimedArrays, Content):
     history: tuple[str, ...] = field(default=(), compare=False)
     deviation: np.ndarray | None = None
     settings: SolveSettings | None = field(default=None, compare=False)
+
+    def _sizes(self) -> str:
+        return f"{self.n_frames} frames at {self.rate:g} Hz, {len(self.names)} bases"
 
     def __post_init__(self) -> None:
         weights = np.array(self.weights, dtype=np.float64)

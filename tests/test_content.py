@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import signface
+import signface as sf
 from signface.descriptors import Descriptors
 from signface.face.layout import MarkerLayout
 from signface.face.mesh import Mesh
@@ -57,6 +57,27 @@ def test_equal_is_what_holds_the_same(thing, change):
     assert thing != "another thing"
 
 
+@pytest.mark.parametrize(
+    ("thing", "shown"),
+    [
+        (sf.datasets.mini_take(), "<Take M2_EU_04: 1184 frames at 200 Hz, 46 markers>"),
+        (sf.open_recording(sf.datasets.mini_file()), "<TakeFile M2_EU_04: 1184 frames at 200 Hz, 46 markers, on disk>"),
+        (sf.datasets.mini_weights(), "<Descriptors M2_EU_04: 1184 frames at 200 Hz, 51 bases>"),
+        (sf.datasets.mini_reference(), "<Segments M2_EU_04: 3 stable, 2 transitions, with labels>"),
+        (sf.datasets.mini_corpus(), "<Corpus mini: 4 takes of 2 signers>"),
+        (sf.load_model(), "<TrainedModel default: gru of 51 bases, for affect>"),
+        (sf.read_face(), "<FaceModel default: 51 bases, 3411 vertices>"),
+        (
+            sf.choose_layout(sf.datasets.mini_take().labels, sf.read_face()),
+            "<MarkerLayout default-40: 40 face markers, 6 head markers>",
+        ),
+    ],
+    ids=lambda value: None if isinstance(value, str) else type(value).__name__,
+)
+def test_an_object_prints_as_a_few_words(thing, shown):
+    assert str(thing) == repr(thing) == shown
+
+
 def test_how_it_came_about_does_not_count():
     take = Descriptors(WEIGHTS, ("a", "b"), 50.0)
     assert take == take.changed("looked at")
@@ -72,7 +93,7 @@ def test_an_array_is_nothing_and_nothing_is_an_array():
 
 def test_every_frozen_object_over_arrays_compares_by_content():
     """No dataclass keeps an equality that raises."""
-    package = Path(signface.__file__).parent
+    package = Path(sf.__file__).parent
     others = []
     for file in package.rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text("utf-8"))):

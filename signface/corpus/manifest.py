@@ -76,7 +76,7 @@ class TakeEntry:
         return self.path.stem
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Corpus:
     """The takes of a corpus, in the order of the manifest.
 
@@ -103,6 +103,9 @@ class Corpus:
 
     def __len__(self) -> int:
         return len(self.takes)
+
+    def __repr__(self) -> str:
+        return f"<Corpus {self.folder.name}: {len(self)} takes of {len(self.signers)} signers>"
 
     def __iter__(self) -> Iterator[TakeEntry]:
         return iter(self.takes)

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from signface.content import Content
+from signface.content import Content, Summary
 from signface.errors import SignfaceError
 from signface.face.model import FaceModel
 
 ROLES = ("face", "head")
 
 
-@dataclass(frozen=True, eq=False)
-class MarkerLayout(Content):
+@dataclass(frozen=True, eq=False, repr=False)
+class MarkerLayout(Summary, Content):
     """Marker labels, their roles, and their points on a face's neutral surface.
 
     Parameters
@@ -49,6 +49,9 @@ class MarkerLayout(Content):
     corners: np.ndarray
     barycentric: np.ndarray
     name: str = "layout"
+
+    def _sizes(self) -> str:
+        return f"{len(self.face_labels)} face markers, {len(self.head_labels)} head markers"
 
     def __post_init__(self) -> None:
         labels, roles = tuple(map(str, self.labels)), tuple(map(str, self.roles))

@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from signface.content import Content
+from signface.content import Content, Summary
 from signface.errors import SignfaceError
 from signface.face.mesh import Mesh
 
 
-@dataclass(frozen=True, eq=False)
-class FaceModel(Content):
+@dataclass(frozen=True, eq=False, repr=False)
+class FaceModel(Summary, Content):
     """A blendshape face (Reverdy 2019, eq. 4.1 and 5.2): `neutral + sum_i weight_i * bases[i]`.
 
     Parameters
@@ -62,6 +62,9 @@ class FaceModel(Content):
     name: str = "face"
     history: tuple[str, ...] = field(default=(), compare=False)
     colours: np.ndarray | None = None
+
+    def _sizes(self) -> str:
+        return f"{len(self.names)} bases, {len(self.mesh.vertices)} vertices"
 
     def __post_init__(self) -> None:
         bases = np.array(self.bases, dtype=np.float64)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from signface.content import Summary
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError, SignfaceWarning
 from signface.label.calibration import calibrated
@@ -93,8 +94,8 @@ class Card:
     tier: str = "affect"
 
 
-@dataclass(frozen=True)
-class TrainedModel:
+@dataclass(frozen=True, repr=False)
+class TrainedModel(Summary):
     """A trained classifier and its card.
 
     Parameters
@@ -121,6 +122,9 @@ class TrainedModel:
     card: Card
     name: str = "model"
     intensity: IntensityClassifier | None = None
+
+    def _sizes(self) -> str:
+        return f"{self.card.classifier} of {len(self.card.bases)} bases, for {self.card.tier}"
 
     @property
     def sequential(self) -> bool:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from signface.content import Content
+from signface.content import Content, Summary
 from signface.errors import SignfaceError
 from signface.files import whole_file
 
@@ -23,8 +23,8 @@ KINDS = ("stable", "transition")
 LEAST_GAP_S = 0.04
 
 
-@dataclass(frozen=True, eq=False)
-class Segments(Content):
+@dataclass(frozen=True, eq=False, repr=False)
+class Segments(Summary, Content):
     """A table of segments in time order, without overlap.
 
     Parameters
@@ -69,6 +69,10 @@ class Segments(Content):
         if unknown:
             raise SignfaceError(f"{self.name}: unknown kind of segment: {', '.join(map(str, unknown))}")
         self._hold(table=table, history=tuple(self.history))
+
+    def _sizes(self) -> str:
+        stable = int((self.table["kind"] == "stable").sum())
+        return f"{stable} stable, {len(self) - stable} transitions, {'with' if self.labelled else 'no'} labels"
 
     def __len__(self) -> int:
         return len(self.table)

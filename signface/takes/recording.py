@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from signface.content import Summary
 from signface.frames import TimedArrays
 from signface.takes.take import Labelled, Take
 
@@ -44,8 +45,8 @@ class Recording(Labelled, Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class TakeFile(TimedArrays):
+@dataclass(frozen=True, repr=False)
+class TakeFile(TimedArrays, Summary):
     """A recording on disk.
 
     Parameters
@@ -76,6 +77,9 @@ class TakeFile(TimedArrays):
         positions = self.read(begin, end, step)
         positions[~np.isfinite(positions).all(axis=2)] = np.nan
         return positions
+
+    def _sizes(self) -> str:
+        return f"{self.n_frames} frames at {self.rate:g} Hz, {len(self.labels)} markers, on disk"
 
     def whole(self) -> Take:
         """All of it, in memory."""

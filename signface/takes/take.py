@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from signface.content import Content
+from signface.content import Content, Summary
 from signface.errors import SignfaceError
 from signface.extras import needed
 from signface.frames import TimedArrays
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     import xarray
 
 
-@dataclass(frozen=True, eq=False)
-class Take(TimedArrays, Content):
+@dataclass(frozen=True, eq=False, repr=False)
+class Take(TimedArrays, Summary, Content):
     """Trajectories of markers.
 
     Parameters
@@ -62,6 +62,9 @@ class Take(TimedArrays, Content):
     start: float = 0.0
     name: str = "take"
     history: tuple[str, ...] = field(default=(), compare=False)
+
+    def _sizes(self) -> str:
+        return f"{self.n_frames} frames at {self.rate:g} Hz, {len(self.labels)} markers"
 
     def __post_init__(self) -> None:
         positions = np.array(self.positions, dtype=np.float64)
