@@ -18,5 +18,6 @@ print("written:", *(file.name for file in files))
 
 # %%
 # What was found, at a glance; ``take.eaf`` opens in ELAN, with the same curves in its timeseries viewer.
+# (ELAN's colours are written to ``take.pfsx`` as well; the list does not name it, since ELAN rewrites it.)
 
 figure = sf.draw_timeline(annotation.descriptors, annotation.segments)

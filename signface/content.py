@@ -51,7 +51,7 @@ class Content:
 
 
 class Summary:
-    """An object that has a name is shown by it and by its sizes, which `_sizes` tells; for dataclasses with `repr=False`.
+    """An object is shown by its name and its sizes, which `_sizes` tells; for dataclasses with `repr=False`.
 
     Examples
     --------

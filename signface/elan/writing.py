@@ -147,7 +147,7 @@ def write_eaf(
     -------
     list of Path
         What belongs to the take, the `.eaf` first: the curves, and their description unless the file has one of its
-        own.
+        own. ELAN's colours, `TAKE.pfsx`, are written beside them and not listed: ELAN replaces that file when it likes.
 
     Raises
     ------

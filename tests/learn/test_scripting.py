@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 
 import pytest
 
@@ -21,7 +20,6 @@ def test_the_script_of_the_documentation_trains_compares_and_saves(tmp_path, mon
     script, _ = scripts()
     work = [line for line in script.splitlines() if line and not line.startswith(("from ", "import "))]
     assert len(work) <= 20
-    shutil.copytree(REPOSITORY / "corpora" / "mini", tmp_path / "corpora" / "mini")
     monkeypatch.chdir(tmp_path)
     exec(compile(script, "docs/scripting.md", "exec"), {"__name__": "script"})
     card = load_model(tmp_path / "mine.skops").card
