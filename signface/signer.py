@@ -133,11 +133,14 @@ class SignerLevel(Content):
         The bases.
     mean, spread : (N,) arrays
         Mean and standard deviation of the weight of each base over all frames.
+    solve : mapping
+        The `SolveSettings` of the takes, as plain values; empty where they are not known or differ.
     """
 
     names: tuple[str, ...]
     mean: np.ndarray
     spread: np.ndarray
+    solve: Mapping[str, Any] = field(default_factory=dict)
 
 
 def signer_level(takes: Sequence[Descriptors]) -> SignerLevel:
@@ -165,7 +168,9 @@ def signer_level(takes: Sequence[Descriptors]) -> SignerLevel:
     if not seconds:
         raise SignfaceError(f"{takes[0].name}: no frame has weights", hint="look at the markers: signface take info")
     mean = total / seconds
-    return SignerLevel(names, mean, np.sqrt((squares / seconds - mean**2).clip(0)))
+    solves = [{} if take.settings is None else take.settings.as_dict() for take in takes]
+    alike = all(not take.settings.differences(solves[0]) for take in takes if take.settings is not None)
+    return SignerLevel(names, mean, np.sqrt((squares / seconds - mean**2).clip(0)), solves[0] if alike else {})
 
 
 @dataclass(frozen=True)
@@ -231,7 +236,8 @@ class Signer:
             plain["bases"] = [[base, marker, *displacement] for base, marker, displacement in rows]
         if self.level is not None:
             level = self.level
-            plain["level"] = {"names": list(level.names), "mean": level.mean.tolist(), "spread": level.spread.tolist()}
+            numbers = {"mean": level.mean.tolist(), "spread": level.spread.tolist()}
+            plain["level"] = {"names": list(level.names), **numbers, "solve": dict(level.solve)}
         return plain
 
     def save(self, path: str | PathLike[str]) -> Path:
@@ -294,4 +300,4 @@ def _level(content: Mapping[str, Any] | None) -> SignerLevel | None:
     mean, spread = (np.array(content[key], dtype=np.float64) for key in ("mean", "spread"))
     if mean.shape != (len(names),) or spread.shape != mean.shape or not np.isfinite([mean, spread]).all():
         raise ValueError("the level does not match its names")
-    return SignerLevel(names, mean, spread)
+    return SignerLevel(names, mean, spread, dict(content.get("solve") or {}))

@@ -63,7 +63,7 @@ RESULTS_ONLY = {
     ),
     "metrics": ("label", "learn", "evaluation", "solver"),
     "settings": ("solver", "label", "elan", "learn"),
-    "report": ("cli", "corpus", "solver"),
+    "report": ("cli", "solver"),
 }
 
 

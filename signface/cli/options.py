@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
+import warnings
 from collections.abc import Collection, Mapping
 from dataclasses import MISSING, Field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from signface.errors import SignfaceError
+from signface.errors import SignfaceError, SignfaceWarning
 from signface.settings.base import Settings
 from signface.settings.solve import SolveSettings
 
@@ -149,7 +150,11 @@ def signer_from(arguments: argparse.Namespace) -> Signer:
     name = getattr(arguments, "signer", None) or None
     if arguments.signer_file is None:
         return Signer(name or "")
-    return Signer.read(arguments.signer_file, name=name)
+    signer = Signer.read(arguments.signer_file)
+    if name and signer.name not in ("", name):
+        message = f"{arguments.signer_file} is of {signer.name}, and the tiers will be called after {name}"
+        warnings.warn(message, SignfaceWarning, stacklevel=2)
+    return replace(signer, name=name) if name else signer
 
 
 def read_face_and_layout(settings: SolveSettings) -> tuple[FaceModel, MarkerLayout | None]:

@@ -169,15 +169,22 @@ class TrainedModel(Summary):
             As `columns`.
         """
         self.columns(descriptors)
-        if self.card.solve and descriptors.settings is not None:
-            differences = descriptors.settings.differences(self.card.solve)
+        normalises = self.card.normalise == "signer"
+        if normalises and level is None:
+            warnings.warn(
+                f"{self.name} normalises signers, and of this signer only {descriptors.name} is known: "
+                "name what signface corpus signers learnt of all takes (--signer-file)",
+                SignfaceWarning,
+                stacklevel=2,
+            )
+        others = {f"{self.name} was trained on takes": self.card.solve}
+        if normalises and level is not None:
+            others["the signer's level is of takes"] = level.solve
+        for what, solve in others.items():
+            differences = [] if descriptors.settings is None or not solve else descriptors.settings.differences(solve)
             if differences:
-                warnings.warn(
-                    f"{self.name}: was trained on takes solved otherwise than {descriptors.name}: "
-                    f"{', '.join(differences)}",
-                    SignfaceWarning,
-                    stacklevel=2,
-                )
+                said = f"{what} solved otherwise than {descriptors.name}: {', '.join(differences)}"
+                warnings.warn(said, SignfaceWarning, stacklevel=2)
         take = descriptors.on(self.card.bases)
         variant = DescriptorVariant(self.card.features, self.card.normalise)
         return take if variant.plain else variant.of(take, level)

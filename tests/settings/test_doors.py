@@ -289,3 +289,25 @@ def test_the_manual_lists_every_setting():
             flag = item.metadata["flag"] or f"--{item.name.replace('_', '-')}"
             assert f"| `[{kind.TABLE}]` | `{item.name}` | `{flag}` |" in text
             assert item.metadata["help"] in text
+
+
+def test_what_makes_labels_differ_is_said(laboratory, tmp_path, capsys):
+    take, known = str(laboratory / "M2_EU_04.c3d"), str(laboratory / "M2.json")
+    common = [
+        "annotate",
+        take,
+        "--classifier",
+        str(laboratory / "model.skops"),
+        "--replace",
+        "-o",
+        str(tmp_path / "a.eaf"),
+    ]
+    lab = ["--settings", str(laboratory / "lab.toml")]
+    assert main([*common, *lab]) == 0
+    assert "of this signer only M2_EU_04 is known" in capsys.readouterr().err
+    assert main([*common, *lab, "--signer-file", known]) == 0
+    assert "note" not in capsys.readouterr().err
+    assert main([*common, "--signer-file", known, "--signer", "Eva"]) == 0
+    notes = capsys.readouterr().err
+    assert "M2.json is of M2, and the tiers will be called after Eva" in notes
+    assert "the signer's level is of takes solved otherwise" in notes
