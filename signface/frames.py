@@ -46,6 +46,18 @@ class Timed:
         """(F,) time of each frame in seconds."""
         return self.start + np.arange(self.n_frames) / self.rate
 
+    def clamp(self, begin: int, end: int) -> tuple[int, int]:
+        """What there is of the frames from `begin` to before `end`: frames beyond the first and the last are left out.
+
+        Examples
+        --------
+        >>> from signface.datasets import mini_take
+        >>> mini_take().clamp(1000, 2000), mini_take().clamp(5000, 6000)
+        ((1000, 1184), (1184, 1184))
+        """
+        begin = min(max(begin, 0), self.n_frames)
+        return begin, min(max(begin, end), self.n_frames)
+
     def frame_at(self, seconds: float) -> int:
         """Index of the frame nearest to a time in seconds.
 

@@ -67,6 +67,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     command = next((word for word in words if word in COMMANDS), None)
     parser = build_parser(command)
+    warnings.showwarning = _say_warning
     arguments = parser.parse_args(words)
     if arguments.version:
         from importlib.metadata import version
@@ -76,7 +77,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     if arguments.command is None:
         parser.print_help()
         return 0
-    warnings.showwarning = _say_warning
     on_compiling(_say_why_it_takes_long)
     try:
         return arguments.run(arguments) or 0

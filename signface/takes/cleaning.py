@@ -55,6 +55,7 @@ class Kept(Timed):
 
     def frames(self, begin: int, end: int, step: int = 1) -> np.ndarray:
         """(K, M, 3) positions of every `step`-th frame from `begin` to before `end`, read only."""
+        begin, end = self.clamp(begin, end)
         first, last, known = self._kept
         if not first <= begin <= end <= last:
             known = self._recording.frames(begin, end)

@@ -41,7 +41,10 @@ class Recording(Labelled, Protocol):
         ...
 
     def frames(self, begin: int, end: int, step: int = 1) -> np.ndarray:
-        """(K, M, 3) positions of every `step`-th frame from `begin` to before `end`, millimetres, NaN where missing."""
+        """(K, M, 3) positions of every `step`-th frame from `begin` to before `end`, millimetres, NaN where missing.
+
+        Frames beyond the first and the last are left out, as slices of arrays do.
+        """
         ...
 
 
@@ -55,7 +58,8 @@ class TakeFile(TimedArrays, Summary):
         As of `Take`.
     n_frames : int
     read : callable
-        `read(begin, end, step)` gives the positions of these frames, millimetres, NaN where missing.
+        `read(begin, end, step)` gives the positions of these frames, millimetres, NaN where missing. It is asked for
+        frames that there are.
     """
 
     labels: tuple[str, ...]
@@ -74,6 +78,9 @@ class TakeFile(TimedArrays, Summary):
         SignfaceError
             The file cannot be read there: a row is cut short or holds words.
         """
+        begin, end = self.clamp(begin, end)
+        if begin == end:
+            return np.empty((0, len(self.labels), 3))
         positions = self.read(begin, end, step)
         positions[~np.isfinite(positions).all(axis=2)] = np.nan
         return positions
@@ -88,7 +95,7 @@ class TakeFile(TimedArrays, Summary):
 
     def _rows(self, begin: int, end: int) -> dict[str, Any]:
         def read(first: int, last: int, step: int) -> np.ndarray:
-            return self.read(begin + first, min(begin + last, end), step)
+            return self.read(begin + first, begin + last, step)
 
         return {"read": read, "n_frames": end - begin}
 

@@ -148,6 +148,9 @@ class Staged(Timed):
 
     def block(self, begin: int, end: int, step: int = 1) -> Block:
         """Every `step`-th frame from `begin` to before `end`, behind the stage, with the head's poses where known."""
+        begin, end = self.clamp(begin, end)
+        if begin == end:
+            return Block(np.empty((0, len(self.labels), 3)), range(begin, end, step))
         if step > 1 and not self._stage.alone:
             every = [
                 self.block(begin + first, begin + last).positions[-first % step :: step].copy()

@@ -91,6 +91,7 @@ class Take(TimedArrays, Summary, Content):
 
     def frames(self, begin: int, end: int, step: int = 1) -> np.ndarray:
         """(K, M, 3) positions of every `step`-th frame from `begin` to before `end`."""
+        begin, end = self.clamp(begin, end)
         return self.positions[begin:end:step]
 
     def select(self, labels: Sequence[str]) -> np.ndarray:

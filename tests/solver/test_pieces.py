@@ -170,5 +170,5 @@ def test_a_recording_damaged_in_the_middle_leaves_no_file(gappy, tmp_path, capsy
     lines[900] = ",".join(cells)
     (tmp_path / "take.csv").write_text("\n".join(lines) + "\n")
     assert main(["solve", str(tmp_path / "take.csv"), "-o", str(tmp_path / "weights.csv")]) == 2
-    assert "take.csv: has cells that are not numbers" in capsys.readouterr().err
+    assert "take.csv: line 901 has a cell that is no number: 'words'" in capsys.readouterr().err
     assert [file.name for file in tmp_path.iterdir()] == ["take.csv"]

@@ -176,7 +176,7 @@ def test_words_among_the_numbers_are_refused(tmp_path, capsys):
         cells[-1] = "oops"
         lines[-2] = separator.join(cells)
         file.write_text("\n".join(lines))
-        assert "not numbers" in refusal(file, capsys)
+        assert f"line {len(lines) - 1} has a cell that is no number: 'oops'" in refusal(file, capsys)
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from signface.cli.main import main
 from signface.descriptors import Descriptors
-from signface.errors import SignfaceError
+from signface.errors import SignfaceError, SignfaceWarning
 from signface.takes.formats import registry
 from signface.takes.formats.c3d import write_c3d
 from signface.takes.formats.registry import SHIPPED, FileHead, register_format, supported_formats
@@ -30,29 +31,45 @@ def only_shipped_formats_remain(monkeypatch):
     monkeypatch.setattr(registry, "_formats", dict(registry._formats))
 
 
-def documented_reader():
-    """The worked example of the page on recordings: its reader, and the beginning of a file of its format."""
-    section = RECORDINGS_PAGE.read_text().partition("## Adding a reader")[2].partition("\n## ")[0]
-    blocks = re.findall(r"((?:^ {4}.*\n|^\n)+)", section, re.MULTILINE)
-    blocks = [re.sub(r"^ {4}", "", block, flags=re.MULTILINE).strip("\n") + "\n" for block in blocks if block.strip()]
-    file = next(block for block in blocks if block.startswith("FACEDOTS"))
-    reader = next(block for block in blocks if "@register_format" in block)
-    return reader, file
+def documented_blocks():
+    """The blocks of code of the page on recordings."""
+    blocks = re.findall(r"((?:^ {4}.*\n|^\n)+)", RECORDINGS_PAGE.read_text("utf-8"), re.MULTILINE)
+    return [re.sub(r"^ {4}", "", block, flags=re.MULTILINE).strip("\n") + "\n" for block in blocks if block.strip()]
+
+
+def documented(sign):
+    """The one block of the page that has this in it."""
+    (block,) = (block for block in documented_blocks() if sign in block)
+    return block
+
+
+def installed(folder, name, reader):
+    """A package with a reader in `folder`, as pip leaves it there."""
+    package = folder / f"{name}-1.0.dist-info"
+    package.mkdir()
+    (folder / f"{name}.py").write_text(reader)
+    (package / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}-package\nVersion: 1.0\n")
+    (package / "entry_points.txt").write_text(f"[{registry.ENTRY_POINTS}]\n{name} = {name}\n")
+
+
+def command(folder, *words, before=""):
+    """What the command line prints where the packages of `folder` are installed."""
+    program = f"import sys; sys.path.insert(0, {str(folder)!r}); {before}from signface.cli.main import main; main()"
+    return subprocess.run([sys.executable, "-c", program, *words], capture_output=True, text=True, check=True)
 
 
 @pytest.fixture
 def facedots(tmp_path, monkeypatch):
     """A file of the documented format, and its reader as a module that can be imported."""
-    reader, file = documented_reader()
-    (tmp_path / "facedots.py").write_text(reader)
-    (tmp_path / "smile.dots").write_text(file)
+    (tmp_path / "facedots.py").write_text(documented("@register_format"))
+    (tmp_path / "smile.dots").write_text(next(block for block in documented_blocks() if block.startswith("FACEDOTS")))
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "facedots", raising=False)
     return tmp_path / "smile.dots"
 
 
 def test_the_documented_reader_reads_the_documented_file(facedots):
-    with pytest.raises(SignfaceError, match="of no format that signface reads"):
+    with pytest.raises(SignfaceError, match=r"of no format that signface reads.* must be installed"):
         read_take(facedots)
     __import__("facedots")
     assert recognise(facedots) == "facedots"
@@ -79,15 +96,55 @@ def test_the_documented_reader_refuses_damaged_files_with_one_clear_line(facedot
 
 
 def test_the_command_line_reads_a_format_that_an_installed_package_brings(facedots, tmp_path):
-    package = tmp_path / "facedots-1.0.dist-info"
-    package.mkdir()
-    (package / "METADATA").write_text("Metadata-Version: 2.1\nName: facedots\nVersion: 1.0\n")
-    (package / "entry_points.txt").write_text("[signface.formats]\nfacedots = facedots\n")
-    program = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from signface.cli.main import main; sys.exit(main())"
-    result = subprocess.run(
-        [sys.executable, "-c", program, "take", "info", str(facedots)], capture_output=True, text=True, check=True
-    )
-    assert "3 frames at 100 Hz" in result.stdout
+    project = tomllib.loads(documented("[build-system]"))
+    assert project["project"]["entry-points"][registry.ENTRY_POINTS] == {"facedots": "facedots"}
+    assert project["tool"]["setuptools"]["py-modules"] == ["facedots"]
+    installed(tmp_path, "facedots", documented("@register_format"))
+    assert "3 frames at 100 Hz" in command(tmp_path, "take", "info", str(facedots)).stdout
+    assert "written by our lab's own program" in command(tmp_path, "take", "info", "--formats").stdout
+
+
+CLAIMS_TABLES = """
+from signface.takes.formats.registry import register_format
+from signface.takes.take import Take
+
+@register_format({name!r}, recognise=lambda head: 0.7 * bool(head.cells))
+def open_it(path, *, unit=None):
+    return Take([[[0.0, 0, 0]]] * {frames}, ("NOSE",), 25.0)
+"""
+
+
+@pytest.mark.parametrize("before", ["", "import ours; "], ids=["installed", "and imported"])
+def test_among_equals_a_scripts_reader_goes_before_an_installed_one_and_that_before_a_shipped_one(tmp_path, before):
+    write_table(TAKE, tmp_path / "take.csv")
+    installed(tmp_path, "ours", CLAIMS_TABLES.format(name="ours", frames=5))
+    words = ("take", "info", str(tmp_path / "take.csv"))
+    assert "5 frames at 25 Hz" in command(tmp_path, *words, before=before).stdout
+    (tmp_path / "script.py").write_text(CLAIMS_TABLES.format(name="theirs", frames=7))
+    assert "7 frames at 25 Hz" in command(tmp_path, *words, before=f"import script; {before}").stdout
+
+
+@pytest.mark.parametrize(
+    "reader",
+    ["import absent_module", "this is no Python", r"raise RuntimeError('two\nlines')"],
+    ids=["absent", "syntax", "error"],
+)
+def test_an_installed_reader_that_is_broken_is_named_and_other_files_are_read(tmp_path, reader):
+    write_table(TAKE, tmp_path / "take.csv")
+    installed(tmp_path, "broken", reader)
+    for words in (("take", "info", str(tmp_path / "take.csv")), ("take", "info", "--formats")):
+        result = command(tmp_path, *words)
+        assert result.stdout
+        assert result.stderr.startswith("signface: note: the reader broken of the installed package broken-package")
+        assert result.stderr.count("\n") == 1
+
+
+def test_the_scripts_of_the_page_run():
+    names = {"__name__": "script"}
+    for sign in ("stabilise(take", "cleaning_stages("):
+        exec(compile(documented(sign), "docs/recordings.md", "exec"), names)
+    assert names["still"].n_frames == len(names["head_poses"]) == 1184
+    assert names["positions"].shape == (200, len(names["layout"].labels), 3)
 
 
 def test_the_surest_format_opens_a_file_and_among_equals_the_one_declared_last(tmp_path):
@@ -129,6 +186,16 @@ def test_one_careless_recogniser_does_not_keep_other_files_from_being_read(tmp_p
 
     write_c3d(TAKE, tmp_path / "take.c3d")
     assert recognise(tmp_path / "take.c3d") == "c3d"
+
+
+def test_a_recogniser_with_a_defect_is_named_and_other_files_are_read(tmp_path):
+    @register_format("defective", recognise=lambda head: head.no_such_thing)
+    def read(path, *, unit=None):
+        raise AssertionError
+
+    write_c3d(TAKE, tmp_path / "take.c3d")
+    with pytest.warns(SignfaceWarning, match="the reader of defective cannot look at .*take.c3d"):
+        assert recognise(tmp_path / "take.c3d") == "c3d"
 
 
 def test_a_format_that_holds_weights_is_not_solved_in_a_corpus(tmp_path):

@@ -13,6 +13,7 @@ from signface.descriptors_files import write_weights
 from signface.errors import SignfaceError
 from signface.takes.formats.c3d import open_c3d, write_c3d
 from signface.takes.formats.table import write_table
+from signface.takes.formats.text import TextFile, TextRows
 from signface.takes.reading import read_recording, read_take, recognise
 from signface.takes.take import Take
 from tests.fixtures.takes_files import (
@@ -373,3 +374,20 @@ def test_a_weights_file_is_recognised_under_any_ending(tmp_path):
         assert back.start == 2.0
     with pytest.raises(SignfaceError, match="holds weights, not markers"):
         read_take(tmp_path / "w.csv")
+
+
+def test_any_white_space_separates_and_blank_lines_do_not_count(tmp_path):
+    file = tmp_path / "rows.txt"
+    file.write_text("\nNAMES\n\n  1  2 \t -  \n\n4 5 nan 7\n")
+    for separator in (" ", None):
+        rows = TextRows(TextFile(file), 1, 3, separator)
+        np.testing.assert_array_equal(rows.values(0, 2), [[1, 2, np.nan], [4, 5, np.nan]])
+        np.testing.assert_array_equal(rows.column(1), [2, 5])
+    file.write_text("NAMES\n\n1 2 3\n\n 4  high 6\n")
+    rows = TextRows(TextFile(file), 1, 3, None)
+    for read in (lambda: rows.values(0, 2), lambda: rows.column(1)):
+        with pytest.raises(SignfaceError, match="line 5 has a cell that is no number: 'high'"):
+            read()
+    file.write_text("NAMES\n1 2  \n")
+    with pytest.raises(SignfaceError, match="line 2 has 2 cells instead of 3"):
+        TextRows(TextFile(file), 1, 3, None).values(0, 1)

@@ -8,9 +8,10 @@ from signface.face.layout_files import read_layout
 from signface.takes.cleaning import Kept, cleaning_stages
 from signface.takes.filtering import Lowpass, lowpass
 from signface.takes.formats.c3d import open_c3d, write_c3d
+from signface.takes.formats.table import write_table
 from signface.takes.gaps import GapFiller, fill_gaps
 from signface.takes.labels import Renaming, rename_to
-from signface.takes.reading import read_take
+from signface.takes.reading import open_recording, read_take
 from signface.takes.recording import pieces
 from signface.takes.stabilisation import HeadMotion, NeutralAlignment, align_neutral, stabilise
 from signface.takes.stages import Block, Stage, View, block_of, run
@@ -207,3 +208,18 @@ def test_stages_leave_what_they_are_given_untouched(stages, gappy):
         given = Take(gappy.positions, gappy.labels, gappy.rate)
         run(given, stage)
         np.testing.assert_array_equal(given.positions, gappy.positions)
+
+
+def test_frames_beyond_the_ends_are_left_out_by_every_recording(gappy, stages, tmp_path):
+    write_c3d(gappy, tmp_path / "take.c3d")
+    write_table(gappy, tmp_path / "take.csv")
+    files = [open_recording(tmp_path / name, unit="mm") for name in ("take.c3d", "take.csv")]
+    behind = [View(gappy).through(stage).recording for stage in stages.values()]
+    cuts = [file.between(0.5, 2.5) for file in files]
+    for recording in (gappy, *files, *cuts, *behind, Kept(behind[1])):
+        last, markers = recording.n_frames, len(recording.labels)
+        np.testing.assert_array_equal(recording.frames(last - 5, last + 70), recording.frames(last - 5, last))
+        np.testing.assert_array_equal(recording.frames(-7, 3), recording.frames(0, 3))
+        np.testing.assert_array_equal(recording.frames(last - 9, last + 70, 4), recording.frames(last - 9, last, 4))
+        for begin, end in ((100_000, 100_200), (-20, -10), (last, last + 1), (30, 20)):
+            assert recording.frames(begin, end).shape == (0, markers, 3)

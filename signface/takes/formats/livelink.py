@@ -107,7 +107,8 @@ def read_livelink(path: str | PathLike[str], *, unit: str | None = None) -> Desc
         The columns are others, a row is cut short or holds words, or the timecodes do not rise.
     """
     file = Path(path)
-    lines = [line for line in read_text(file).splitlines() if line.strip()]
+    numbered = [(number, line) for number, line in enumerate(read_text(file).splitlines(), 1) if line.strip()]
+    lines = [line for _, line in numbered]
     columns, separator = header_cells(lines[0])
     if [column.lower() for column in columns[:2]] != ["timecode", "blendshapecount"]:
         raise SignfaceError("is no Live Link Face CSV", file=file, hint="its first column is Timecode")
@@ -124,7 +125,7 @@ def read_livelink(path: str | PathLike[str], *, unit: str | None = None) -> Desc
         raise SignfaceError("the file has no frames, only a header", file=file, hint="export it again")
     rows = [line.split(separator, 1) for line in lines[1:]]
     frame, rate = _frames([row[0] for row in rows], file)
-    cells = [(number, row[1]) for number, row in enumerate(rows, start=2) if len(row) > 1 and row[1].strip()]
+    cells = [(number, row[1]) for (number, _), row in zip(numbered[1:], rows) if len(row) > 1 and row[1].strip()]
     values = numbers(cells, len(columns) - 1, separator, file)
     if len(values) != len(frame):
         raise SignfaceError("a row has a timecode and nothing else", file=file, hint="the file may be cut short")

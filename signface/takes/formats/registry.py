@@ -7,8 +7,8 @@
 
 A format is declared on the function that opens its files. That function and `recognise` are all there is to a reader;
 `docs/recordings.md` shows a whole one. An installed package may bring formats too, without a script that imports it,
-by an entry point of the group `signface.formats` that names the module; such packages are asked where nothing else
-recognises a file.
+by an entry point of the group `signface.formats` that names the module. Of readers that are equally sure of a file a
+script's comes first, then an installed package's, then a shipped one.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from __future__ import annotations
 import csv
 import importlib
 import struct
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,7 +25,7 @@ from pathlib import Path
 from typing import Literal, TypeVar
 
 from signface.descriptors import Descriptors
-from signface.errors import SignfaceError
+from signface.errors import SignfaceError, SignfaceWarning
 from signface.takes.formats.text import header_cells
 from signface.takes.recording import TakeFile
 from signface.takes.take import Take
@@ -112,9 +113,13 @@ class Format:
             return float(self.recognise(head))
         except (ValueError, LookupError, struct.error):
             return 0.0
+        except Exception as error:  # a defect in one reader must not keep others from reading their files
+            _warn(f"the reader of {self.title} cannot look at {head.path}", error)
+            return 0.0
 
 
 _formats: dict[str, Format] = {}
+_installed_imported = False
 
 
 def register_format(
@@ -135,7 +140,8 @@ def register_format(
     recognise : callable
         `recognise(head)` says how surely a file with this `FileHead` is of the format: 1 (or True) where it bears a
         sign that no other format has, less where it may be another, 0 (or False) where it is not. The surest format
-        opens the file; among equals the one declared last.
+        opens the file; among equals the one declared last, which is a script's rather than an installed package's,
+        and that rather than a shipped one.
     title : str, optional
         As errors and lists name it; `name` by default.
     written_by : str
@@ -169,37 +175,47 @@ def register_format(
 
     def register(open: AnyOpener) -> AnyOpener:
         if open.__module__ not in SHIPPED:
-            _import_shipped()  # so that they do not replace or precede it later
+            _import_all()  # so that they do not replace or precede it later
         _formats[name] = Format(name, title or name, written_by, tuple(endings), recognise, open, holds)
         return open
 
     return register
 
 
-def _import_shipped() -> None:
+def _import_all() -> None:
+    """Import the shipped modules, then, once, those that installed packages name as formats."""
+    global _installed_imported
     for module in SHIPPED:
         importlib.import_module(module)
+    if _installed_imported:
+        return
+    _installed_imported = True  # before they are imported: declaring a format leads here
+    from importlib.metadata import entry_points
+
+    for point in entry_points(group=ENTRY_POINTS):
+        try:
+            importlib.import_module(point.module)
+        except Exception as error:  # whatever is wrong with it, other files can be read
+            package = point.dist.name if point.dist else point.name
+            _warn(f"the reader {point.name} of the installed package {package} cannot be imported", error)
+
+
+def _warn(problem: str, error: Exception) -> None:
+    message = f"{problem} ({type(error).__name__}: {error}): its files are not read"
+    warnings.warn(" ".join(message.split()), SignfaceWarning, stacklevel=2)
 
 
 def supported_formats() -> tuple[Format, ...]:
-    """The formats that signface reads: those it ships with, then those declared elsewhere.
+    """The formats that signface reads: those it ships with, then installed packages', then those declared elsewhere.
 
     Examples
     --------
     >>> [format.name for format in supported_formats()][:4]
     ['c3d', 'trc', 'qtm', 'table']
     """
-    _import_shipped()
+    _import_all()
     shipped = {module: number for number, module in enumerate(SHIPPED)}
     return tuple(sorted(_formats.values(), key=lambda format: shipped.get(format.open.__module__, len(shipped))))
-
-
-def _import_installed() -> None:
-    """Import the modules that installed packages name as formats."""
-    from importlib.metadata import entry_points
-
-    for point in entry_points(group=ENTRY_POINTS):
-        point.load()
 
 
 def format_of(path: str | PathLike[str]) -> Format:
@@ -215,27 +231,21 @@ def format_of(path: str | PathLike[str]) -> Format:
     signface.takes.reading.open_recording : open it.
     """
     head = _head(Path(path))
-    surest = _surest(head)
-    if surest is None:
-        _import_installed()
-        surest = _surest(head)
-    if surest is not None:
-        return surest
     formats = supported_formats()
+    certainties = [(format.certainty(head), number, format) for number, format in enumerate(formats)]
+    certainty, _, surest = max(certainties, key=lambda entry: entry[:2])
+    if certainty > 0:
+        return surest
     promised = [format.title for format in formats if head.path.suffix.lower() in format.endings]
+    hint = f"signface reads {', '.join(format.title for format in formats)}"
+    if promised:
+        problem = f"is not what its ending says: no {' or '.join(promised)} file"
+        raise SignfaceError(problem, file=head.path, hint=hint)
     raise SignfaceError(
-        f"is not what its ending says: no {' or '.join(promised)} file"
-        if promised
-        else "is of no format that signface reads",
+        "is of no format that signface reads",
         file=head.path,
-        hint=f"signface reads {', '.join(format.title for format in formats)}",
+        hint=f"{hint}; a reader of your own must be installed (see docs/recordings.md, Adding a reader)",
     )
-
-
-def _surest(head: FileHead) -> Format | None:
-    certainties = [(format.certainty(head), number, format) for number, format in enumerate(supported_formats())]
-    certainty, _, format = max(certainties, key=lambda entry: entry[:2])
-    return format if certainty > 0 else None
 
 
 def _head(file: Path) -> FileHead:

@@ -3,7 +3,7 @@
 - `header_cells`: a header line's cells, and what separates them.
 - `read_text`: a file's text, whatever its encoding.
 - `TextFile`, `TextRows`: a file whose lines, or rows of numbers, are read in pieces.
-- `numbers`: cells to a table of floats, quickly, with the line named that does not fit.
+- `numbers`: cells to a table of floats, quickly, with the line and the cell named that do not fit.
 - `marker_rows`: rows of numbers as a recording.
 - `even_rate`: the rate from a column of times.
 """
@@ -25,6 +25,10 @@ from signface.takes.recording import TakeFile
 
 #: Bytes that are looked through at a time for the beginnings of lines, and rows whose times are read at a time.
 BLOCK, ROWS = 1 << 20, 16384
+
+#: What stands in the cells of a missing marker, as programs and spreadsheets write it.
+MISSING = {"", "-", "NaN", "nan", "-NaN", "-nan", "1.#IND", "-1.#IND", "1.#QNAN", "-1.#QNAN"}
+MISSING |= {"NULL", "null", "None", "NA", "<NA>", "#NA", "N/A", "n/a", "#N/A", "#N/A N/A"}
 
 #: What a blank line consists of: the signs up to the space.
 BLANK = "".join(map(chr, range(33)))
@@ -164,7 +168,7 @@ class TextRows:
     ----------
     text : TextFile
     first : int
-        Index of the first row among the lines that are not blank.
+        Index of the first row among the lines that are not blank: blank lines do not count in the header either.
     columns, separator
         As for `numbers`.
 
@@ -174,11 +178,11 @@ class TextRows:
         There is no row.
     """
 
-    def __init__(self, text: TextFile, first: int, columns: int, separator: str) -> None:
-        self.text, self.first, self.columns, self.separator = text, first, columns, separator
+    def __init__(self, text: TextFile, first: int, columns: int, separator: str | None) -> None:
+        self.text, self.first, self.columns, self.separator = text, first, columns, _separator(separator)
         if len(text) <= first:
             raise SignfaceError("the file has no frames, only a header", file=text.file, hint="export it again")
-        self.decimal = _decimal(text.lines(first, first + 50), separator)
+        self.decimal = _decimal(text.lines(first, first + 50), self.separator)
 
     def __len__(self) -> int:
         return len(self.text) - self.first
@@ -196,40 +200,51 @@ class TextRows:
         SignfaceError
             A row has fewer cells than columns, or a cell of the column is no number.
         """
-        cells: list[str] = []
+        values: list[float] = []
         for begin in range(self.first, len(self.text), ROWS):
             lines = self.text.lines(begin, begin + ROWS)
             _check_cells(lines, self.columns, self.separator, self.text.file)
-            cells.extend(line.split(self.separator, number + 1)[number].strip() for _, line in lines)
-        try:
-            return np.array([float(cell.replace(self.decimal, ".") or "nan") for cell in cells])
-        except ValueError as error:
-            raise _no_numbers(self.text.file) from error
+            for line_number, line in lines:
+                cell = line.split(self.separator, number + 1)[number].strip()
+                try:
+                    values.append(float(cell.replace(self.decimal, ".") or "nan"))
+                except ValueError as error:
+                    raise _no_number(line_number, cell, self.text.file) from error
+        return np.array(values)
 
 
-def _decimal(lines: Sequence[tuple[int, str]], separator: str) -> str:
+def _separator(separator: str | None) -> str | None:
+    """A space stands for any white space, as None does."""
+    return None if separator == " " else separator
+
+
+def _decimal(lines: Sequence[tuple[int, str]], separator: str | None) -> str:
     """The decimal sign: a comma where lines have some that separate nothing, and no point."""
     beginning = "".join(line for _, line in lines[:50])
     return "," if separator != "," and "," in beginning and "." not in beginning else "."
 
 
-def _check_cells(lines: Sequence[tuple[int, str]], columns: int, separator: str, file: Path) -> None:
+def _count(line: str, separator: str | None) -> int:
+    return len(line.split()) if separator is None else line.count(separator) + 1
+
+
+def _check_cells(lines: Sequence[tuple[int, str]], columns: int, separator: str | None, file: Path) -> None:
     for number, line in lines:
-        if line.count(separator) < columns - 1:
-            cells = line.count(separator) + 1
+        cells = _count(line, separator)
+        if cells < columns:
             raise SignfaceError(
                 f"line {number} has {cells} cells instead of {columns}", file=file, hint="the file may be cut short"
             )
 
 
-def _no_numbers(file: Path) -> SignfaceError:
-    return SignfaceError("has cells that are not numbers", file=file, hint="look at the rows below its header")
+def _no_number(line: int, cell: str, file: Path) -> SignfaceError:
+    return SignfaceError(f"line {line} has a cell that is no number: {cell[:20]!r}", file=file, hint="correct it")
 
 
 def numbers(
-    lines: Sequence[tuple[int, str]], columns: int, separator: str, file: Path, *, decimal: str | None = None
+    lines: Sequence[tuple[int, str]], columns: int, separator: str | None, file: Path, *, decimal: str | None = None
 ) -> np.ndarray:
-    """Lines of cells to a (rows, columns) float64 array; an empty cell is NaN.
+    """Lines of cells to a (rows, columns) float64 array; an empty cell, `-`, `nan` or `null` is NaN.
 
     Cells beyond `columns` are left out (many exporters end their lines with a separator). Numbers have a decimal point,
     or a decimal comma where the separator is another sign.
@@ -240,8 +255,8 @@ def numbers(
         Number in the file, for errors, and text of each line below the header; none blank.
     columns : int
         How many cells a row has.
-    separator : str
-        `,`, `;` or tab.
+    separator : str, optional
+        `,`, `;` or tab; a space or None for any white space, also at the ends of a line.
     file : Path
         Named in errors.
     decimal : str, optional
@@ -250,28 +265,46 @@ def numbers(
     Raises
     ------
     SignfaceError
-        A row has fewer cells than columns (the last one is often cut short) or cells are words.
+        A row has fewer cells than columns (the last one is often cut short), or a cell is a word; the message names
+        the line.
+
+    Examples
+    --------
+    >>> numbers([(3, " 1.5  -  2 ")], 3, None, Path("smile.dots"))
+    array([[1.5, nan, 2. ]])
+    >>> numbers([(3, "1.5 high 2")], 3, None, Path("smile.dots"))
+    Traceback (most recent call last):
+    signface.errors.SignfaceError: smile.dots: line 3 has a cell that is no number: 'high'. Correct it
     """
     import pandas as pd
 
+    separator = _separator(separator)
     _check_cells(lines, columns, separator, file)
+    decimal = _decimal(lines, separator) if decimal is None else decimal
     try:
         table = pd.read_csv(
             io.StringIO("\n".join(line for _, line in lines)),
-            sep=separator,
+            sep=separator or r"\s+",
             header=None,
             usecols=range(columns),
-            names=range(max(line.count(separator) for _, line in lines) + 1),
-            decimal=_decimal(lines, separator) if decimal is None else decimal,
+            names=range(max(_count(line, separator) for _, line in lines)),
+            decimal=decimal,
             skipinitialspace=True,
             quoting=3,
-            na_values=["NaN", "nan", "NULL", "null", "-", "#N/A"],
+            na_values=MISSING,
+            keep_default_na=False,
             low_memory=False,
             engine="c",
         )
         return table.to_numpy(dtype=np.float64)
     except (ValueError, OverflowError, pd.errors.ParserError) as error:
-        raise _no_numbers(file) from error
+        for number, line in lines:
+            for cell in map(str.strip, line.split(separator)[:columns]):
+                try:
+                    float("nan" if cell in MISSING else cell.replace(decimal, "."))
+                except ValueError:
+                    raise _no_number(number, cell, file) from error
+        raise SignfaceError("has cells that are not numbers", file=file, hint="export it again") from error
 
 
 def even_rate(times: np.ndarray, file: Path) -> float:
@@ -319,7 +352,7 @@ def marker_rows(
     Parameters
     ----------
     rows : TextRows
-        A row for each frame.
+        A row for each frame. A marker of which one coordinate is missing is missing.
     columns : (M, 3) int array
         Columns of x, y and z of each marker.
     labels, rate, start, history
