@@ -10,8 +10,8 @@ from signface.label.persistence import load_model
 from tests.conftest import REPOSITORY
 
 
-def scripts():
-    text = (REPOSITORY / "docs" / "scripting.md").read_text(encoding="utf-8")
+def scripts(page="scripting.md"):
+    text = (REPOSITORY / "docs" / page).read_text(encoding="utf-8")
     return re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
 
 
@@ -34,3 +34,12 @@ def test_the_script_of_stretches_and_tables_runs(tmp_path, monkeypatch):
     exec(compile(scripts()[1], "docs/scripting.md", "exec"), names)
     assert names["weights"].time[[0, -1]].tolist() == [1.0, 3.995]
     assert [file.name for file in tmp_path.iterdir()] == ["weights.parquet"]
+
+
+def test_the_script_of_the_data_opens_what_ships():
+    (script,) = scripts("data.md")
+    names = {"__name__": "script"}
+    exec(compile(script, "docs/data.md", "exec"), names)
+    assert {names[what].name for what in ("take", "weights", "reference")} == {"M1_EU_11"}
+    assert names["model"].card.bases == names["face"].names
+    assert set(names["layout"].labels) == set(names["take"].labels)
