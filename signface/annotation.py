@@ -19,6 +19,7 @@ import numpy as np
 
 from signface.content import Content
 from signface.descriptors import Descriptors
+from signface.errors import counted
 from signface.signer import Signer
 
 if TYPE_CHECKING:
@@ -132,8 +133,8 @@ class Annotation(Content):
         return to_pympi(self, options=options)
 
     def __repr__(self) -> str:
-        stable = _count((self.segments.table["kind"] == "stable").sum(), "stable segment")
-        channels = "" if self.channels is None else f", {_count(len(self.channels), 'channel')}"
+        stable = counted((self.segments.table["kind"] == "stable").sum(), "stable segment")
+        channels = "" if self.channels is None else f", {counted(len(self.channels), 'channel')}"
         return f"<Annotation of {self.name}: {stable}{channels}, by {self.model}>"
 
     def __str__(self) -> str:
@@ -148,14 +149,10 @@ class Annotation(Content):
         residual = self.residual_mm
         fit = "" if residual is None else f"; the solved face lies {residual:.2f} mm from the markers (median residual)"
         duration = f"{self.descriptors.duration:.1f} s"
-        return f"{duration}, {_count(len(stable), 'stable segment')}: {', '.join(labels) or 'none'}{fit}"
+        return f"{duration}, {counted(len(stable), 'stable segment')}: {', '.join(labels) or 'none'}{fit}"
 
     def _repr_html_(self) -> str:
         return f"<p>{self.name}: {self}</p>{self.segments.table.to_html(index=False)}"
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" + ("" if number == 1 else "s")
 
 
 def annotate(

@@ -9,6 +9,17 @@ from __future__ import annotations
 from os import PathLike
 
 
+def counted(number: int, noun: str) -> str:
+    """`1 take`, `2 takes`.
+
+    Examples
+    --------
+    >>> counted(1, "take"), counted(2, "take")
+    ('1 take', '2 takes')
+    """
+    return f"{number} {noun}" + ("" if number == 1 else "s")
+
+
 class SignfaceError(Exception):
     """Something the user can mend: what file, what is wrong, what to do.
 

@@ -8,12 +8,14 @@ from functools import partial
 from pathlib import Path
 
 from signface.cli.options import add_settings_arguments, add_solve_arguments, settings_from
-from signface.errors import SignfaceError
+from signface.cli.train import add_tier_arguments, tier_options
+from signface.errors import SignfaceError, counted
 from signface.progress import progress
 from signface.settings.eaf import EafOptions
 from signface.settings.solve import SolveSettings
 
 EXAMPLE = """  signface corpus check corpora/feel
+  signface corpus check corpora/lab --tier brows --vocabulary brows.txt
   signface corpus run corpora/feel
   signface corpus run corpora/feel --channels --template lab.etf
   signface corpus run corpora/feel --scheduler tcp://10.0.0.1:8786
@@ -28,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     check = actions.add_parser("check", help="find every problem of a corpus at once")
     _add_corpus(check)
     _add_workers(check)
+    add_tier_arguments(check)
     add_solve_arguments(check)
 
     run_ = actions.add_parser("run", help="solve and annotate every take; goes on where it was stopped")
@@ -88,13 +91,14 @@ def check(arguments: argparse.Namespace) -> int:
     found = check_corpus(
         arguments.corpus,
         settings=settings_from(arguments, SolveSettings),
+        **tier_options(arguments),
         workers=arguments.workers,
         progress=lambda items, total: progress(items, "checking", total=total),
     )
     for problem in found.problems:
         print(f"signface: {problem}", file=sys.stderr)
     count = len(found.problems)
-    print(f"{found.summary}: {'no problem' if not count else '1 problem' if count == 1 else f'{count} problems'}")
+    print(f"{found.summary}: {counted(count, 'problem') if count else 'no problem'}")
     return 2 if count else 0
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from signface.cli.options import add_settings_arguments, add_solve_arguments, settings_from, words
-from signface.errors import SignfaceError
+from signface.errors import SignfaceError, counted
 from signface.progress import progress
 from signface.settings.solve import SolveSettings
 from signface.settings.training import TrainingSettings
@@ -19,9 +19,9 @@ EXAMPLE = """  signface train corpora/feel -o mine.skops
 
 
 def add_tier_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what `train` and `evaluate` can be told of the tier that was annotated; see `tier_options`."""
+    """Add what commands can be told of the tier that was annotated; see `tier_options`."""
     parser.add_argument(
-        "--tier", default="affect", metavar="NAME", help="the tier annotated: NAME@SIGNER or NAME (default: affect)"
+        "--tier", default="affect", metavar="NAME", help="the tier annotated, without @SIGNER (default: affect)"
     )
     parser.add_argument(
         "--vocabulary",
@@ -32,12 +32,12 @@ def add_tier_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--sparse",
         action="store_true",
-        help="what is not annotated is unknown (default: none, unless transitions are annotated)",
+        help="only if what is not annotated was not looked at; the model then never says none",
     )
 
 
 def tier_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """The options of `solve_corpus` that `add_tier_arguments` asks for."""
+    """The options of `solve_corpus` and `check_corpus` that `add_tier_arguments` asks for."""
     vocabulary = None
     if arguments.vocabulary is not None:
         from signface.elan.vocabularies import read_vocabulary
@@ -67,6 +67,7 @@ def run(arguments: argparse.Namespace) -> None:
     from signface.corpus.examples import solve_corpus
     from signface.corpus.manifest import read_corpus
     from signface.label.persistence import save_model
+    from signface.learn.examples import label_counts
     from signface.learn.training import train, train_each
 
     output = arguments.output
@@ -89,6 +90,8 @@ def run(arguments: argparse.Namespace) -> None:
         **tier_options(arguments),
         progress=lambda items: progress(items, "solving", total=annotated),
     )
+    for label, (segments, takes) in label_counts(examples).items():
+        print(f"  {label}: {counted(segments, 'segment')} in {counted(takes, 'take')}")
     training = train_each if arguments.signer == "each" else train
     trained = training(examples, settings, solve=solve, corpus=whole.folder.resolve().name, name=output.stem)
     for model in trained.values() if isinstance(trained, dict) else [trained]:
@@ -96,7 +99,7 @@ def run(arguments: argparse.Namespace) -> None:
         save_model(model, file)
         card = model.card
         print(
-            f"{file}: {card.classifier}, {len(card.takes)} takes ({', '.join(card.kinds)}) of "
+            f"{file}: {card.classifier}, {counted(len(card.takes), 'take')} ({', '.join(card.kinds)}) of "
             f"{', '.join(card.signers)}, {card.frames} frames, labels {' '.join(card.labels)}"
         )
         for what, score in card.scores.items():

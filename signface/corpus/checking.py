@@ -21,10 +21,11 @@ from signface.corpus.describing import layout_for, read_entry, recipe_of
 from signface.corpus.manifest import TakeEntry, find_manifest, read_rows
 from signface.corpus.origin import Recipe, content_digest, make_recipe, take_name
 from signface.descriptors import Descriptors
-from signface.errors import SignfaceError
+from signface.errors import SignfaceError, counted
 from signface.settings.solve import SolveSettings
 
 if TYPE_CHECKING:
+    from signface.label.vocabulary import Vocabulary
     from signface.takes.take import Take
 
 #: An annotation may reach this far beyond its take (s): annotators place boundaries by the video, a few frames off.
@@ -61,6 +62,9 @@ class TakeCheck:
     entry: TakeEntry
     recipe: Recipe
     signers: frozenset[str]
+    tier: str = "affect"
+    vocabulary: Vocabulary | None = None
+    sparse: bool = False
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,9 @@ def check_corpus(
     path: str | PathLike[str],
     *,
     settings: SolveSettings | None = None,
+    tier: str = "affect",
+    vocabulary: Vocabulary | None = None,
+    sparse: bool = False,
     workers: int | None = None,
     progress: Callable[[Iterable, int], Iterable] = lambda items, total: items,
 ) -> CheckedCorpus:
@@ -86,7 +93,8 @@ def check_corpus(
       the same content under two names (it would be trained on and tested);
     - signers: names that differ in their case only, tiers of signers whom `takes.csv` does not know;
     - annotations: no EAF, no reference tier, labels outside the vocabulary, overlaps, an annotation that reaches beyond
-      its take or covers less than half of it, one annotation for two takes.
+      its take, one annotation for two takes; where transitions are annotated, as in affect, also an empty tier and one
+      that covers less than half of its take.
 
     Parameters
     ----------
@@ -94,6 +102,8 @@ def check_corpus(
         The folder of the corpus or its `takes.csv`.
     settings : SolveSettings, optional
         As in `signface.corpus.running.run_corpus`.
+    tier, vocabulary, sparse : optional
+        As in `signface.corpus.examples.solve_corpus`.
     workers : int, optional
         Takes looked at at the same time; one for each core by default.
     progress : callable, optional
@@ -125,7 +135,7 @@ def check_corpus(
         except SignfaceError as error:
             problems.append(f"{entry.path}: {error}")
             solved_as = recipe
-        checks.append(TakeCheck(number, entry, solved_as, signers))
+        checks.append(TakeCheck(number, entry, solved_as, signers, tier, vocabulary, sparse))
     looked_at: dict[int, CheckedTake] = {}
     results = on_cores(check_take, checks, workers=min(workers or os.cpu_count() or 1, max(1, len(checks))))
     for check, result in progress(results, len(checks)):
@@ -143,7 +153,10 @@ def check_corpus(
             problems.append(f"{copies[0].path}: holds the same recording as {others}. Leave all but one out")
     seconds = sum(take.duration for take in looked_at.values())
     annotated = sum(entry.annotation is not None for entry in entries)
-    summary = f"{file.parent}: {len(entries)} takes of {len(signers)} signers, {annotated} annotated, {seconds:.0f} s"
+    summary = (
+        f"{file.parent}: {counted(len(entries), 'take')} of {counted(len(signers), 'signer')}, "
+        f"{annotated} annotated, {seconds:.0f} s"
+    )
     # An annotation that two takes share is looked at twice.
     return CheckedCorpus(tuple(dict.fromkeys(problems)), summary)
 
@@ -193,7 +206,7 @@ def check_take(check: TakeCheck) -> CheckedTake:
         except Exception as error:
             problems.append(f"{entry.path}: a defect of signface, {type(error).__name__}: {error}")
     if entry.annotation is not None and entry.annotation.is_file():
-        problems += _problems_of_reference(entry, check.signers, span)
+        problems += _problems_of_reference(check, span)
     return CheckedTake(tuple(problems), span[1] - span[0] if span else 0.0, digest)
 
 
@@ -215,35 +228,47 @@ def _problems_of_markers(entry: TakeEntry, recipe: Recipe, take: Take) -> list[s
     ]
 
 
-def _problems_of_reference(entry: TakeEntry, signers: frozenset[str], span: tuple[float, float] | None) -> list[str]:
+def _problems_of_reference(check: TakeCheck, span: tuple[float, float] | None) -> list[str]:
     """What is wrong with a reference annotation, by itself and beside its take (start and end in seconds)."""
-    from signface.elan.reference import read_reference, read_tiers
-    from signface.label.vocabulary import AFFECT, Vocabulary
+    from signface.elan.reference import read_reference, read_tiers, reference_vocabulary
+    from signface.label.vocabulary import AFFECT, NONE, Vocabulary
 
+    entry, tier = check.entry, check.tier
     file = entry.annotation
     assert file is not None
     problems = []
     try:
         tiers = read_tiers(file)
-        strangers = sorted({name.removeprefix("affect@") for name in tiers if name.startswith("affect@")} - signers)
-        problems += [f"{file}: its tier affect@{name} is of a signer who is not in takes.csv" for name in strangers]
-        rows = next((tiers[name] for name in (f"affect@{entry.signer}", "affect") if name in tiers), None)
+        annotators = {name.removeprefix(f"{tier}@") for name in tiers if name.startswith(f"{tier}@")}
+        strangers = sorted(annotators - check.signers)
+        problems += [f"{file}: its tier {tier}@{name} is of a signer who is not in takes.csv" for name in strangers]
+        rows = next((tiers[name] for name in (f"{tier}@{entry.signer}", tier) if name in tiers), None)
         annotated = () if rows is None else tuple(dict.fromkeys(rows["label"].str.strip()))
-        foreign = [label for label in annotated if label not in AFFECT.allowed]
+        vocabulary = check.vocabulary
+        if vocabulary is None and (annotated or tier == "affect"):
+            vocabulary = reference_vocabulary([(file, entry.signer)], tier)
+        if vocabulary is not None and not (check.sparse or vocabulary.transitions):
+            vocabulary = vocabulary.including(NONE)
+        foreign = [label for label in annotated if vocabulary is not None and label not in vocabulary.allowed]
         try:
-            reference = read_reference(file, entry.signer)
+            reference = read_reference(file, entry.signer, tier=tier, vocabulary=vocabulary)
         except SignfaceError:
             if not foreign:
                 raise
+            assert vocabulary is not None
             problems.append(
                 f"{file}: the labels {', '.join(map(repr, foreign))} on the tier of {entry.signer} are not in the "
-                "vocabulary. Stable labels are N A D F J Sa Su; transitions join two of them, as NA"
+                f"vocabulary. Stable labels are {' '.join(vocabulary.values)}"
+                + ("; transitions join two of them, as NA" if vocabulary == AFFECT else "")
             )
-            reference = read_reference(file, entry.signer, vocabulary=Vocabulary("annotated", annotated))
+            reference = read_reference(file, entry.signer, tier=tier, vocabulary=Vocabulary("annotated", annotated))
     except SignfaceError as error:
         return [*problems, str(error)]
     table = reference.table
+    whole = vocabulary is not None and vocabulary.transitions  # elsewhere, moments in which nothing happens are empty
     if not len(table):
+        if not whole:
+            return problems
         return [*problems, f"{file}: its reference tier of {entry.signer} is empty"]
     if span is None:
         return problems
@@ -254,7 +279,7 @@ def _problems_of_reference(entry: TakeEntry, signers: frozenset[str], span: tupl
             f"to {span[1]:.3f} s. Is it the annotation of this take? Does start_s say where the take begins?"
         )
     covered = float((table["end_s"].clip(*span) - table["start_s"].clip(*span)).sum()) / (span[1] - span[0])
-    if covered < LEAST_COVERED:
+    if whole and covered < LEAST_COVERED:
         problems.append(
             f"{file}: annotates {covered:.0%} of the take {entry.path.name}. Is it the annotation of this take?"
         )

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
@@ -15,14 +16,11 @@ from signface.corpus.origin import Origin, Recipe, find_origin, make_recipe
 from signface.corpus.signers import find_signer
 from signface.corpus.store import DescriptorStore, open_store
 from signface.descriptors import Descriptors
-from signface.errors import SignfaceError
-from signface.label.vocabulary import Vocabulary
+from signface.errors import SignfaceError, SignfaceWarning
+from signface.label.vocabulary import NONE, Vocabulary
 from signface.learn.examples import Example
 from signface.segmentation.segments import Segments
 from signface.settings.solve import SolveSettings
-
-#: The label of what nobody annotated.
-NONE = "none"
 
 #: Takes solved at the same time.
 WORKERS = 2
@@ -54,8 +52,9 @@ def solve_corpus(
     vocabulary : Vocabulary, optional
         The labels allowed; by default as `signface.elan.reference.reference_vocabulary` finds them.
     sparse : bool
-        What is not annotated is unknown. Otherwise, on a tier whose vocabulary has no transitions, it is `none`, which
-        is added to the vocabulary.
+        What is not annotated was not looked at, and takes in which nothing is annotated are passed over with a
+        `SignfaceWarning`. Otherwise, on a tier whose vocabulary has no transitions, it is `none`, which is added to the
+        vocabulary: an empty tier is a take in which nothing happened.
     workers : int
         Takes solved at the same time, each in a process of its own.
     progress : callable, optional
@@ -94,12 +93,12 @@ def solve_corpus(
     store = open_store(corpus.folder)
     recipe = make_recipe(settings)
     known: dict[tuple[str, str | None], Recipe] = {}
+    entries, references, vocabulary = _references(entries, tier, vocabulary, sparse)
     origins = [find_origin(entry, corpus.folder, recipe_of(entry, recipe, known)) for entry in entries]
-    references, vocabulary = _references(entries, tier, vocabulary)
     named = tier.partition("@")[0]
     blank = not (sparse or vocabulary.transitions)
     if blank:
-        vocabulary = vocabulary.with_blank(NONE)
+        vocabulary = vocabulary.with_blank()
     solved = progress(_described(entries, origins, store, workers, corpus.folder))
     examples = []
     for entry, origin, reference, descriptors in zip(entries, origins, references, solved, strict=True):
@@ -121,25 +120,38 @@ def solve_corpus(
 
 
 def _references(
-    entries: list[TakeEntry], tier: str, vocabulary: Vocabulary | None
-) -> tuple[list[Segments], Vocabulary]:
-    """The reference of each take, and their vocabulary."""
+    entries: list[TakeEntry], tier: str, vocabulary: Vocabulary | None, sparse: bool
+) -> tuple[list[TakeEntry], list[Segments], Vocabulary]:
+    """The takes that say something, the reference of each, and their vocabulary."""
     from signface.elan.reference import read_reference, reference_vocabulary
 
     files = [(entry.annotation, entry.signer) for entry in entries if entry.annotation is not None]
     if vocabulary is None:
         vocabulary = reference_vocabulary(files, tier)
-    references = []
-    for file, signer in files:
-        reference = read_reference(file, signer, tier=tier, vocabulary=vocabulary)
-        if reference.table.empty:
+    blank = not (sparse or vocabulary.transitions)
+    readable = vocabulary.including(NONE) if blank else vocabulary
+    kept = []
+    for entry, (file, signer) in zip([entry for entry in entries if entry.annotation is not None], files, strict=True):
+        reference = read_reference(file, signer, tier=tier, vocabulary=readable)
+        if blank:  # what is called none is what is not annotated: one segment with the gaps beside it
+            shown = reference.table[reference.table["label"] != NONE].reset_index(drop=True)
+            kept.append(
+                (entry, reference if len(shown) == len(reference) else reference.changed(f"left {NONE} out", shown))
+            )
+        elif len(reference):
+            kept.append((entry, reference))
+        elif sparse and not vocabulary.transitions:
+            note = f"{file}: nothing is annotated on the tier {tier} of {signer}: the take is passed over"
+            warnings.warn(note, SignfaceWarning, stacklevel=3)
+        else:
             raise SignfaceError(
                 f"its reference annotation is empty (signer {signer})",
                 file=file,
                 hint="annotate the take, or leave out its annotation in takes.csv",
             )
-        references.append(reference)
-    return references, vocabulary
+    if not kept:
+        raise SignfaceError(f"nothing is annotated on the tier {tier}")
+    return [entry for entry, _ in kept], [reference for _, reference in kept], vocabulary
 
 
 def _described(

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
-from signface.errors import SignfaceError
+from signface.errors import SignfaceError, counted
 from signface.files import whole_file
 
 MANIFEST = "takes.csv"
@@ -176,8 +176,7 @@ def read_corpus(path: str | PathLike[str]) -> Corpus:
     if problems:
         more = len(problems) - SPELT_OUT
         spelt = "; ".join(problems[:SPELT_OUT]) + (f"; and {more} more" if more > 0 else "")
-        count = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
-        raise SignfaceError(f"{count}: {spelt}", file=file, hint="mend the table")
+        raise SignfaceError(f"{counted(len(problems), 'problem')}: {spelt}", file=file, hint="mend the table")
     return Corpus(file.parent, tuple(takes))
 
 
@@ -185,6 +184,8 @@ def find_manifest(path: str | PathLike[str]) -> Path:
     """The `takes.csv` of a corpus, from the path of its folder or of the file itself."""
     file = Path(path)
     if not file.is_dir():
+        if not file.exists() and file.suffix.lower() != ".csv":
+            raise SignfaceError("no such folder", file=path, hint="name the folder of a corpus")
         return file
     if not (file / MANIFEST).is_file():
         raise SignfaceError(f"has no {MANIFEST}", file=path, hint="name the folder of a corpus")

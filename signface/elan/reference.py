@@ -7,7 +7,9 @@
 
 from __future__ import annotations
 
+import difflib
 import json
+import warnings
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from os import PathLike
@@ -21,8 +23,8 @@ from signface.elan.checking import check_document
 from signface.elan.document import CHANNEL_PREFIX, Row, read_document, recorded, tier_rows
 from signface.elan.tiers import clean_name, tier_name
 from signface.elan.vocabularies import vocabulary_of_tier
-from signface.errors import SignfaceError
-from signface.label.vocabulary import AFFECT, INTENSITY, Vocabulary
+from signface.errors import SignfaceError, SignfaceWarning
+from signface.label.vocabulary import AFFECT, INTENSITY, NONE, Vocabulary
 from signface.segmentation.segments import Segments
 
 
@@ -100,7 +102,8 @@ def read_reference(
 def reference_vocabulary(files: Sequence[tuple[str | PathLike[str], str | None]], tier: str) -> Vocabulary:
     """The vocabulary that the references of a corpus share on a tier.
 
-    That of the tier's linguistic type, if all files have the same; else one of all values that are annotated.
+    That of the tier's linguistic type, if all files have the same; else one of all values that are annotated, with a
+    `SignfaceWarning` for each that one take alone holds.
 
     Parameters
     ----------
@@ -116,18 +119,27 @@ def reference_vocabulary(files: Sequence[tuple[str | PathLike[str], str | None]]
     if tier == "affect":
         return AFFECT
     closed: list[Vocabulary] = []
-    labels: set[str] = set()
+    labels: dict[str, list[Path]] = {}
     for eaf, signer in files:
         file = Path(eaf)
         root = read_document(file).getroot()
         name = _tier_name(root, tier, signer, file)
         vocabulary = vocabulary_of_tier(root, name, file)
         closed += [] if vocabulary is None else [vocabulary]
-        labels |= {value.strip() for _, _, value in tier_rows(root)[name]} - {""}
+        for label in {value.strip() for _, _, value in tier_rows(root)[name]} - {""}:
+            labels.setdefault(label, []).append(file)
     if len(closed) == len(files) and len({(one.values, one.transitions) for one in closed}) == 1:
         return max(closed, key=lambda one: len(one.colours))  # not every file has its colours beside it
     if not labels:
         raise SignfaceError(f"nothing is annotated on the tier {tier}")
+    for label, holders in sorted(labels.items()):
+        if len(holders) == 1 < len(files):
+            warnings.warn(
+                f"{holders[0]}: the label {label!r} on the tier {tier} is in this take only. "
+                "Where it is a slip, name the labels that there are: --vocabulary FILE",
+                SignfaceWarning,
+                stacklevel=2,
+            )
     return Vocabulary(tier.partition("@")[0], tuple(sorted(labels)))
 
 
@@ -260,12 +272,10 @@ def _merged(rows: list[tuple[int, int, str]]) -> list[tuple[int, int, str]]:
 
 
 def _vocabulary_of(root: etree._Element, name: str, rows: list[Row], file: Path) -> Vocabulary:
-    """The closed vocabulary of a tier, or one of what it holds."""
+    """The closed vocabulary of a tier, or one of what it holds; `none` alone where nothing happened in the take."""
     closed = vocabulary_of_tier(root, name, file)
     labels = sorted({value.strip() for _, _, value in rows} - {""})
-    if closed is None and not labels:
-        raise SignfaceError(f"nothing is annotated on the tier {name}", file=file)
-    return closed or Vocabulary(name.partition("@")[0], tuple(labels))
+    return closed or Vocabulary(name.partition("@")[0], tuple(labels or [NONE]))
 
 
 def _tier_name(root: etree._Element, wanted: str, signer: str | None, file: Path) -> str:
@@ -273,7 +283,7 @@ def _tier_name(root: etree._Element, wanted: str, signer: str | None, file: Path
     tiers = {tier.get("TIER_ID") or "": tier for tier in root.iterfind("TIER")}
     labs = [name for name, (channel, _) in channel_labels(root).items() if channel == wanted and name in tiers]
     ours = [name for name in tiers if name == wanted or name.startswith(f"{wanted}@")]
-    hint = f"its tiers are {', '.join(list(tiers)[:12]) or 'none'}"
+    hint = _tier_hint(wanted, list(tiers))
     if signer:
         of_signer = [name for name in labs if tiers[name].get("PARTICIPANT") == clean_name(signer)]
         for name in (tier_name(wanted, signer), wanted):
@@ -290,6 +300,18 @@ def _tier_name(root: etree._Element, wanted: str, signer: str | None, file: Path
     if candidates:
         raise SignfaceError(f"has several {wanted} tiers: {', '.join(candidates)}", file=file, hint="name the signer")
     raise SignfaceError(f"no tier {wanted} or {wanted}@SIGNER", file=file, hint=hint)
+
+
+def _tier_hint(wanted: str, tiers: list[str]) -> str:
+    """What to do about a tier that is not there, of those that are."""
+    base = wanted.partition("@")[0]
+    if base != wanted:
+        return f"name the tier without @SIGNER: {base}"
+    hint = f"its tiers are {', '.join(tiers[:12]) or 'none'}"
+    close = difflib.get_close_matches(wanted, {tier.partition("@")[0] for tier in tiers}, n=1)
+    if close:
+        return f"did you mean {close[0]}? {hint[0].upper()}{hint[1:]}"
+    return f"{hint}; another tier: --tier NAME" if wanted == "affect" else hint
 
 
 def _fill_times(root: etree._Element) -> None:

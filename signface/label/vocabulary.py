@@ -41,6 +41,10 @@ GREY: Colour = (153, 153, 153)
 RESTING = ("none", "neutral")
 
 
+#: The label of what nobody annotated.
+NONE = "none"
+
+
 class Entry(NamedTuple):
     """One value of a vocabulary.
 
@@ -261,7 +265,7 @@ class Vocabulary:
         """The vocabulary with one value more, at its end, unless it has it."""
         return self if value in self.values else replace(self, values=(*self.values, value))
 
-    def with_blank(self, value: str = "none") -> Vocabulary:
+    def with_blank(self, value: str = NONE) -> Vocabulary:
         """The vocabulary with a value for what nobody annotated; itself where it has that value.
 
         Examples

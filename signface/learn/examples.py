@@ -208,6 +208,22 @@ def common_vocabulary(examples: Sequence[Example]) -> Vocabulary:
     return first.vocabulary
 
 
+def label_counts(examples: Sequence[Example]) -> dict[str, tuple[int, int]]:
+    """How many stable segments each label of the vocabulary has, and in how many takes; a typo is a label of one take.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> label_counts(sf.datasets.mini_examples())["J"]
+    (4, 3)
+    """
+    labels = [example.stable["label"].tolist() for example in examples]
+    return {
+        value: (sum(take.count(value) for take in labels), sum(value in take for take in labels))
+        for value in common_vocabulary(examples).values
+    }
+
+
 def in_order(examples: Sequence[Example]) -> list[Example]:
     """The takes by signer, kind and name, so that a training does not depend on their order."""
     return sorted(examples, key=lambda example: (example.signer, example.kind, example.take))

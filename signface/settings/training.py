@@ -61,7 +61,10 @@ class TrainingSettings(Settings):
     folds: int = option(5, help="how many parts, at most as many as there are takes or signers", kind=int)
     rate: float = option(10.0, help="frames of a second of stable segment that are trained on", kind=float)
     parameters: Mapping[str, Any] = option(
-        help="parameters of the classifier to set", kind=Mapping, default_factory=dict
+        help="parameters of the classifier to set: NAME=VALUE,...",
+        kind=Mapping,
+        metavar="NAME=VALUE,...",
+        default_factory=dict,
     )
     seed: int = option(0, help="two trainings with one seed give the same model", kind=int)
 

@@ -99,6 +99,8 @@ def test_a_folder_without_manifest_says_so(folder):
         read_corpus(folder)
     with pytest.raises(SignfaceError, match="no such file"):
         read_corpus(folder / "nowhere.csv")
+    with pytest.raises(SignfaceError, match="labb: no such folder"):
+        read_corpus(folder / "labb")
 
 
 def test_takes_are_chosen_by_kind_and_signer_and_unknown_ones_are_named(folder):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -18,7 +19,7 @@ from signface.elan.document import read_document
 from signface.elan.reference import read_reference, read_tiers
 from signface.elan.vocabularies import read_vocabulary, write_vocabulary
 from signface.elan.writing import write_eaf
-from signface.errors import SignfaceError
+from signface.errors import SignfaceError, SignfaceWarning
 from signface.files import bundled_corpus
 from signface.label.labelling import without_transitions
 from signface.label.persistence import load_model, read_card
@@ -78,7 +79,106 @@ def test_a_vocabulary_can_be_named_or_is_found_in_the_annotations(folder, tmp_pa
         solve_corpus(corpus, tier="brows", vocabulary=Vocabulary("brows", ("up",)))
     with pytest.raises(SignfaceError, match=r"no tier nose@M\d or nose"):
         solve_corpus(corpus, tier="nose")
+    with pytest.raises(SignfaceError, match="Did you mean brows"):
+        solve_corpus(corpus, tier="borws")
+    with pytest.raises(SignfaceError, match="Name the tier without @SIGNER: brows"):
+        solve_corpus(corpus, tier="brows@M1")
     assert read_reference(next(iter(corpus)).annotation, tier="brows").table["kind"].eq("stable").all()
+
+
+@pytest.fixture
+def lab(folder, tmp_path):
+    """A copy of the corpus that a test may spoil, and a vocabulary file of what its brows do."""
+    (tmp_path / "brows.txt").write_text("up\ndown\n")
+    return Path(shutil.copytree(folder, tmp_path / "lab"))
+
+
+def annotated(folder, number, rows, vocabulary=None):
+    """Give a take of the corpus a tier of brows with other annotations; what was on it is gone."""
+    entry = list(read_corpus(folder))[number]
+    table = pd.DataFrame(rows, columns=["start_s", "end_s", "label"]).astype({"label": object}).assign(kind="stable")
+    vocabulary = vocabulary or Vocabulary("brows", tuple({row[2]: 0 for row in rows}) or ("up",))
+    entry.annotation.unlink()
+    write_eaf(Segments(table), entry.annotation, signer=entry.signer, tier="brows", vocabulary=vocabulary)
+    return entry
+
+
+def test_a_take_in_which_nothing_happens_is_none_or_passed_over(lab, examples, recwarn):
+    quiet = annotated(lab, 1, [])
+    found = solve_corpus(read_corpus(lab), tier="brows", vocabulary=BROWS)
+    assert [example.take for example in found] == [example.take for example in examples]
+    take = found[1].descriptors
+    rows = found[1].reference.table[["start_s", "end_s", "label"]].to_numpy().tolist()
+    assert rows == [[take.start, take.start + take.duration, "none"]]
+    assert not [warning for warning in recwarn if issubclass(warning.category, SignfaceWarning)]
+    with pytest.warns(SignfaceWarning, match=f"{quiet.annotation.name}: nothing is annotated.*passed over"):
+        sparse = solve_corpus(read_corpus(lab), tier="brows", vocabulary=BROWS, sparse=True)
+    assert [example.take for example in sparse] == [e.take for e in examples if e.take != found[1].take]
+    assert read_reference(quiet.annotation, quiet.signer, tier="brows").table.empty
+    for number in (0, 2, 3):
+        annotated(lab, number, [])
+    with pytest.warns(SignfaceWarning), pytest.raises(SignfaceError, match="nothing is annotated on the tier brows"):
+        solve_corpus(read_corpus(lab), tier="brows", vocabulary=BROWS, sparse=True)
+
+
+def test_none_may_be_written_where_the_vocabulary_lacks_it(lab):
+    annotated(lab, 0, [(0.0, 1.0, "none"), (1.0, 1.4, "up"), (1.4, 1.8, "none")])
+    example = solve_corpus(read_corpus(lab), tier="brows", vocabulary=BROWS)[0]
+    end = example.descriptors.start + example.descriptors.duration
+    assert example.vocabulary == BROWS.with_blank()
+    assert example.reference.table[["end_s", "label"]].to_numpy().tolist() == [
+        [1.0, "none"],
+        [1.4, "up"],
+        [end, "none"],
+    ]
+    with pytest.raises(SignfaceError, match=r"label 'none' .* is not in the vocabulary"):
+        solve_corpus(read_corpus(lab), tier="brows", vocabulary=BROWS, sparse=True)
+
+
+def test_check_looks_at_the_tier_that_is_named(lab, tmp_path, capsys):
+    def check(*options):
+        status = main(["corpus", "check", str(lab), "--workers", "1", *options])
+        shown = capsys.readouterr()
+        return status, [line for line in shown.err.splitlines() if "checking" not in line], shown.out
+
+    brows = ("--tier", "brows", "--vocabulary", str(tmp_path / "brows.txt"))
+    annotated(lab, 1, [])  # without a tier of affect
+    assert check(*brows)[:2] == check("--tier", "brows")[:2] == (0, [])
+    status, lines, _ = check()
+    assert status == 2
+    assert any("another tier: --tier NAME" in line for line in lines)
+    annotated(lab, 1, [(0.0, 1.0, "none"), (1.0, 2.0, "rasied")])
+    assert check("--tier", "brows")[:2] == (0, [])
+    status, lines, _ = check(*brows)
+    assert (status, len(lines)) == (2, 1)
+    assert "the labels 'rasied' on the tier" in lines[0]
+    assert "the labels 'none', 'rasied'" in check(*brows, "--sparse")[1][0]
+    assert "Did you mean brows" in check("--tier", "borws")[1][0]
+
+
+def test_a_slip_of_the_pen_is_noted_where_no_vocabulary_is_named(lab, tmp_path, capsys):
+    for number, rows in enumerate(
+        [[(0.0, 1.0, "up"), (2.0, 3.0, "down")]] * 3 + [[(0.0, 1.0, "up"), (2.0, 3.0, "dwon")]]
+    ):
+        annotated(lab, number, rows)
+    words = [
+        "train",
+        str(lab),
+        "-o",
+        str(tmp_path / "m.skops"),
+        "--tier",
+        "brows",
+        "--classifier",
+        "knn1",
+        "--no-calibrate",
+    ]
+    assert main(words) == 0
+    shown = capsys.readouterr()
+    (note,) = [line for line in shown.err.splitlines() if "note: " in line]
+    assert "the label 'dwon' on the tier brows is in this take only" in note
+    assert "--vocabulary FILE" in note
+    for line in ("  up: 4 segments in 4 takes", "  down: 3 segments in 3 takes", "  dwon: 1 segment in 1 take"):
+        assert line in shown.out.splitlines()
 
 
 def test_equal_annotations_that_touch_are_one(tmp_path):
