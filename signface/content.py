@@ -65,8 +65,7 @@ class Summary:
         @property
         def name(self) -> str: ...
 
-    def _sizes(self) -> str:
-        raise NotImplementedError
+        def _sizes(self) -> str: ...
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.name}: {self._sizes()}>"
