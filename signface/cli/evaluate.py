@@ -42,14 +42,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="for report.html, metrics.json, tables as CSV, figures as SVG and PDF",
     )
     parser.add_argument(
-        "--train-kinds", type=words, default=["IE", "SE"], metavar="IE,SE", help="kinds trained on (default: IE,SE)"
+        "--train-kinds",
+        type=words,
+        metavar="IE,SE",
+        help="kinds trained on (default: IE,SE; all kinds where none of IE, SE and EU is there)",
     )
-    parser.add_argument("--test-kinds", type=words, default=["EU"], metavar="EU", help="kinds tested (default: EU)")
+    parser.add_argument(
+        "--test-kinds", type=words, metavar="EU", help="kinds tested (default: EU; all kinds where none of these is)"
+    )
     parser.add_argument(
         "--protocol",
         choices=("within", "across"),
-        help="train on the same signer, or on all others (default: both, if there are two signers); a kind that is "
-        "both trained on and tested is tested in turns, whole takes left out",
+        help="train on the same signer, or on all others (default: both, where signers and takes suffice); a kind that "
+        "is both trained on and tested is tested in turns, whole takes left out",
     )
     parser.add_argument(
         "--classifiers",
@@ -76,6 +81,7 @@ def run(arguments: argparse.Namespace) -> None:
     from signface.corpus.examples import solve_corpus
     from signface.corpus.manifest import read_corpus
     from signface.evaluation.measure import evaluate
+    from signface.evaluation.usual import usual_kinds, usual_protocols
     from signface.report.evaluation.report import write_report
 
     unknown = [name for name in arguments.classifiers if name not in NAMES | SEQUENCE_NAMES]
@@ -90,19 +96,27 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.output.exists() and not arguments.output.is_dir():
         raise SignfaceError("is a file, not a folder", file=arguments.output, hint="name a folder for the report")
     whole = read_corpus(arguments.corpus)
-    corpus = whole.select(kinds=[*arguments.train_kinds, *arguments.test_kinds])
+    train_kinds, test_kinds = usual_kinds(whole.kinds, arguments.train_kinds, arguments.test_kinds)
+    try:
+        corpus = whole.select(kinds=[*train_kinds, *test_kinds])
+    except SignfaceError as error:
+        hint = f"{error.hint}: name some, --train-kinds K --test-kinds K"
+        raise SignfaceError(error.problem, file=error.file, hint=hint) from None
+    annotated = [take for take in corpus if take.annotation is not None]
+    protocols = [arguments.protocol] if arguments.protocol else None
+    possible = usual_protocols(annotated, protocols, train_kinds=train_kinds, test_kinds=test_kinds)
     examples = solve_corpus(
         corpus,
         settings=solve,
         **tier_options(arguments),
-        progress=lambda items: progress(items, "solving", total=sum(t.annotation is not None for t in corpus)),
+        progress=lambda items: progress(items, "solving", total=len(annotated)),
     )
     measured = evaluate(
         examples,
         settings,
-        protocols=[arguments.protocol] if arguments.protocol else None,
-        train_kinds=arguments.train_kinds,
-        test_kinds=arguments.test_kinds,
+        protocols=protocols if "within" in possible else possible,
+        train_kinds=train_kinds,
+        test_kinds=test_kinds,
         classifiers=arguments.classifiers,
         curves_of=arguments.classifiers if arguments.learning_curve else None,
         progress=progress,

@@ -11,7 +11,8 @@ from functools import partial
 from typing import NamedTuple
 
 from signface.evaluation.details import details
-from signface.evaluation.protocol import PROTOCOLS, UNCALIBRATED, Evaluation, Fold, evaluate_folds, folds_of
+from signface.evaluation.protocol import UNCALIBRATED, Evaluation, Fold, evaluate_folds, folds_of
+from signface.evaluation.usual import usual_kinds, usual_protocols
 from signface.learn.examples import Example
 from signface.segmentation.cutting import segment
 from signface.segmentation.segments import Segments
@@ -50,8 +51,8 @@ def evaluate(
     settings: TrainingSettings = UNCALIBRATED,
     *,
     protocols: Sequence[str] | None = None,
-    train_kinds: Sequence[str] = ("IE", "SE"),
-    test_kinds: Sequence[str] = ("EU",),
+    train_kinds: Sequence[str] | None = None,
+    test_kinds: Sequence[str] | None = None,
     classifiers: Sequence[str] = tuple(NAMES),
     curves_of: Sequence[str] | None = None,
     progress: Callable[[Iterable, str], Iterable] = lambda items, what: items,
@@ -64,10 +65,10 @@ def evaluate(
     settings : TrainingSettings
         How every classifier is trained; `classifier` itself is not looked at.
     protocols : sequence of str, optional
-        Names of `signface.evaluation.protocol.PROTOCOLS`, the main one first; by default all, or `within` alone where
-        there is one signer.
-    train_kinds, test_kinds : sequence of str
-        Kinds of takes to train on and to test.
+        Names of `signface.evaluation.protocol.PROTOCOLS`, the main one first; by default as
+        `signface.evaluation.usual.usual_protocols` says: all, or `within` alone where there is one signer.
+    train_kinds, test_kinds : sequence of str, optional
+        Kinds of takes to train on and to test; by default IE and SE, and EU, or where no take is of these kinds all.
     classifiers : sequence of str
         Names of `NAMES` and `SEQUENCE_NAMES` of `signface.label.labellers`.
     curves_of : sequence of str, optional
@@ -97,8 +98,8 @@ def evaluate(
     >>> sorted(measured.metrics["classifiers"]["knn1"])
     ['automatic_segments', 'frames', 'manual_segments']
     """
-    if protocols is None:
-        protocols = list(PROTOCOLS) if len({example.signer for example in examples}) > 1 else ["within"]
+    train_kinds, test_kinds = usual_kinds([example.kind for example in examples], train_kinds, test_kinds)
+    protocols = usual_protocols(examples, protocols, train_kinds=train_kinds, test_kinds=test_kinds)
     segments = {e.take: segment(e.descriptors) for e in examples}
     evaluations: dict[str, Evaluation] = {}
     folds: dict[str, list[Fold]] = {}

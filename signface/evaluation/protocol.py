@@ -48,6 +48,9 @@ FRAMES_RATE = 25.0
 #: Turns in which a signer's takes are tested, where their kind is trained on as well.
 TURNS = 5
 
+#: What to do where turns cannot be dealt.
+TURNS_HINT = "choose training kinds that are not tested, or --protocol across"
+
 #: How classifiers are trained where nothing else is wanted: calibration trains each of them six times.
 UNCALIBRATED = TrainingSettings(calibrate=False)
 
@@ -165,15 +168,14 @@ def _turns(signer: str, train: Sequence[Example], test: Sequence[Example], turns
     """Folds of one signer whose test takes are trained on in the turns of the others."""
     pairs = inner_folds(test, folds=turns, by_signer=False)
     if not pairs:
-        raise SignfaceError(
-            f"the signer {signer} has too few takes to test in turns", hint="choose training kinds that are not tested"
-        )
+        raise SignfaceError(f"the signer {signer} has too few takes to test in turns", hint=TURNS_HINT)
     folds = []
     for _, tested in pairs:
         away = set(groups_of(tested, by_signer=False))
         kept = [e for e, group in zip(train, groups_of(train, by_signer=False), strict=True) if group not in away]
         if not kept:
-            raise SignfaceError(f"there is nothing to train on for the signer {signer} in one of the turns")
+            problem = f"there is nothing to train on for the signer {signer} in one of the turns"
+            raise SignfaceError(problem, hint=TURNS_HINT)
         folds.append(Fold(signer, tuple(kept), tuple(tested)))
     return folds
 

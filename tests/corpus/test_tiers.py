@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 import shutil
@@ -14,7 +15,7 @@ import pytest
 from signface.annotation import annotate
 from signface.cli.main import main
 from signface.corpus.examples import solve_corpus
-from signface.corpus.manifest import read_corpus
+from signface.corpus.manifest import read_corpus, write_takes
 from signface.elan.document import read_document
 from signface.elan.reference import read_reference, read_tiers
 from signface.elan.vocabularies import read_vocabulary, write_vocabulary
@@ -179,6 +180,50 @@ def test_a_slip_of_the_pen_is_noted_where_no_vocabulary_is_named(lab, tmp_path, 
     assert "--vocabulary FILE" in note
     for line in ("  up: 4 segments in 4 takes", "  down: 3 segments in 3 takes", "  dwon: 1 segment in 1 take"):
         assert line in shown.out.splitlines()
+
+
+def with_kinds(folder, kinds):
+    """Give the takes of the corpus other kinds."""
+    kinds = iter(kinds)
+    write_takes(folder, [dataclasses.replace(entry, kind=next(kinds)) for entry in read_corpus(folder)])
+
+
+def evaluated(folder, tmp_path, capsys, *options):
+    """Status, notes and errors of an evaluation of brows, and what metrics.json says of it."""
+    report = tmp_path / "report"
+    words = ["evaluate", str(folder), "-o", str(report), "--tier", "brows", "--classifiers", "knn1", *options]
+    status = main(words)
+    shown = capsys.readouterr().err.splitlines()
+    file = report / "metrics.json"
+    return status, shown, json.loads(file.read_text())["protocol"] if file.exists() else None
+
+
+def test_kinds_of_ones_own_are_trained_on_and_tested_in_turns(lab, tmp_path, capsys):
+    with_kinds(lab, ["talk", "talk", "story", "story"])
+    status, shown, protocol = evaluated(lab, tmp_path, capsys)
+    assert status == 0
+    assert (protocol["train_kinds"], protocol["test_kinds"]) == (["story", "talk"], ["story", "talk"])
+    assert [line for line in shown if "note: no take is of the kind IE, SE, EU" in line and "all there is" in line]
+    status, shown, _ = evaluated(lab, tmp_path, capsys, "--train-kinds", "talk")
+    assert status == 2
+    assert (
+        "has no take of the kind EU. Its kinds are story, talk: name some, --train-kinds K --test-kinds K" in shown[-1]
+    )
+
+
+def test_a_signer_of_one_take_leaves_the_other_protocol(lab, tmp_path, capsys):
+    takes = list(read_corpus(lab))
+    signer = takes[0].signer
+    others = [take for take in takes if take.signer != signer]
+    write_takes(lab, [dataclasses.replace(take, kind="talk") for take in (takes[0], *others)])
+    named = evaluated(lab, tmp_path, capsys, "--protocol", "within")
+    assert named[0] == 2
+    assert f"the signer {signer} has too few takes to test in turns" in named[1][-1]
+    assert "or --protocol across" in named[1][-1]
+    assert not [line for line in named[1] if "solving" in line]  # it is known from the manifest
+    status, shown, protocol = evaluated(lab, tmp_path, capsys)
+    assert (status, protocol["name"]) == (0, "across")
+    assert sum("the protocol within is left out" in line for line in shown) == 1
 
 
 def test_equal_annotations_that_touch_are_one(tmp_path):
