@@ -148,12 +148,12 @@ def test_check_looks_at_the_tier_that_is_named(lab, tmp_path, capsys):
     status, lines, _ = check()
     assert status == 2
     assert any("another tier: --tier NAME" in line for line in lines)
-    annotated(lab, 1, [(0.0, 1.0, "none"), (1.0, 2.0, "rasied")])
+    annotated(lab, 1, [(0.0, 1.0, "none"), (1.0, 2.0, "raiset")])
     assert check("--tier", "brows")[:2] == (0, [])
     status, lines, _ = check(*brows)
     assert (status, len(lines)) == (2, 1)
-    assert "the labels 'rasied' on the tier" in lines[0]
-    assert "the labels 'none', 'rasied'" in check(*brows, "--sparse")[1][0]
+    assert "the labels 'raiset' on the tier" in lines[0]
+    assert "the labels 'none', 'raiset'" in check(*brows, "--sparse")[1][0]
     assert "Did you mean brows" in check("--tier", "borws")[1][0]
 
 
