@@ -53,6 +53,7 @@ def test_the_curves_lie_beside_the_eaf_and_are_linked(signer_eaf):
     assert (signer_eaf.parent / "out.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_several_takes_go_into_a_folder_and_a_bad_one_does_not_stop_the_others(mini, tmp_path, capsys):
     good = mini.takes[0].path
     bad = tmp_path / "bad.c3d"
@@ -66,6 +67,7 @@ def test_several_takes_go_into_a_folder_and_a_bad_one_does_not_stop_the_others(m
     assert pympi.Eaf(str(tmp_path / "out" / f"{good.stem}.eaf")).get_tier_names()
 
 
+@pytest.mark.slow
 def test_python_and_the_command_line_find_the_same(mini, tmp_path):
     from signface.annotation import annotate
     from signface.elan.reference import read_reference
@@ -80,6 +82,7 @@ def test_python_and_the_command_line_find_the_same(mini, tmp_path):
     np.testing.assert_allclose(written["start_s"], found["start_s"], atol=0.5001e-3)
 
 
+@pytest.mark.slow
 def test_a_corrected_file_is_not_overwritten(mini, tmp_path, capsys):
     take, file = str(mini.takes[0].path), tmp_path / "a.eaf"
     assert main(["annotate", take, "-o", str(file)]) == 0
@@ -129,6 +132,7 @@ def test_a_bad_option_is_one_clear_line_and_nothing_is_written(mini, tmp_path, c
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_an_output_folder_that_cannot_be_written_is_one_clear_line(mini, tmp_path, capsys):
     (tmp_path / "file").write_text("in the way")
     status = main(["annotate", str(mini.takes[0].path), "-o", str(tmp_path / "file" / "out.eaf")])
@@ -146,6 +150,7 @@ def test_two_takes_of_one_name_are_refused_before_anything_is_solved(mini, tmp_p
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_start_of_the_recording_is_honoured(mini, tmp_path):
     """A take whose frame 0 is not the film's first: times in the EAF are the film's."""
     import dataclasses

@@ -93,6 +93,7 @@ def room(name: str) -> str:
     return name.split(".")[1] if "." in name else name
 
 
+@pytest.mark.slow
 def test_no_arrow_points_up():
     upward = [
         f"{name} imports {other}"

@@ -91,6 +91,7 @@ def test_an_array_is_nothing_and_nothing_is_an_array():
     assert (with_deviation == replace(with_deviation, deviation=None)) is False
 
 
+@pytest.mark.slow
 def test_every_frozen_object_over_arrays_compares_by_content():
     """No dataclass keeps an equality that raises."""
     package = Path(sf.__file__).parent

@@ -228,6 +228,7 @@ def tiers_of(source, folder):
     return read_tiers(folder / "a.eaf")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", [".csv", ".parquet"])
 def test_weights_annotate_like_the_take_they_were_solved_from(ending, nodding_take, tmp_path):
     take, tiers = nodding_take

@@ -66,6 +66,7 @@ def test_a_calibrated_signer_is_solved_more_exactly(motion, tmp_path, capsys, la
     assert after < 0.7 * before
 
 
+@pytest.mark.slow
 def test_uncertainty_stands_beside_the_weights(motion, tmp_path):
     take, _, weights, _ = motion
     assert main(["solve", str(take), "-o", str(tmp_path / "w.csv"), "--neutral", "0.3", "--uncertainty"]) == 0
@@ -77,6 +78,7 @@ def test_uncertainty_stands_beside_the_weights(motion, tmp_path):
     assert np.isnan(doubt.weights[:, found.names.index("eyeLookInLeft")]).all()
 
 
+@pytest.mark.slow
 def test_what_a_signers_file_does_not_say_is_refused(motion, tmp_path, capsys):
     take, shown, *_ = motion
     bad = tmp_path / "bad.csv"
@@ -118,6 +120,7 @@ def test_impossible_options_are_one_clear_error(motion, tmp_path, capsys, option
     assert not output.exists()
 
 
+@pytest.mark.slow
 def test_takes_and_faces_that_cannot_be_solved_are_one_clear_error(motion, face, layout, tmp_path, capsys):
     take = motion[0]
     few = tmp_path / "few.csv"
@@ -150,6 +153,7 @@ def test_takes_and_faces_that_cannot_be_solved_are_one_clear_error(motion, face,
         assert all(word in error for word in said), error
 
 
+@pytest.mark.slow
 def test_bases_that_only_the_shell_tells_apart_are_named_in_a_warning(motion, face, layout, tmp_path, capsys):
     """Two bases that do the same to every marker and another thing to the skin between them."""
     jaw = face.bases[face.names.index("jawOpen")]

@@ -53,6 +53,7 @@ def test_segment_writes_csv_only(folder, tmp_path, output, capsys):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_train_writes_a_model_with_its_card(folder, tmp_path, capsys):
     file = tmp_path / "mine.skops"
     assert main(["train", str(folder), "-o", str(file), "--classifier", "knn3", "--kinds", "IE"]) == 0
@@ -64,6 +65,7 @@ def test_train_writes_a_model_with_its_card(folder, tmp_path, capsys):
     assert f"{balanced:.2f}" in printed
 
 
+@pytest.mark.slow
 def test_train_takes_variants_and_chooses_parameters(folder, tmp_path, capsys):
     file = tmp_path / "mine.skops"
     options = ["--features", "weights,windows", "--normalise", "signer", "--aggregate", "frames", "--balanced"]
@@ -80,6 +82,7 @@ def test_train_takes_variants_and_chooses_parameters(folder, tmp_path, capsys):
     assert f"chosen: C {card.parameters['C']}" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_train_each_writes_a_model_for_each_signer(folder, tmp_path):
     assert (
         main(["train", str(folder), "-o", str(tmp_path / "m.skops"), "--classifier", "knn1", "--signer", "each"]) == 0
@@ -204,6 +207,7 @@ SPOILT = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spoil", SPOILT, ids=lambda spoil: spoil.__name__)
 @pytest.mark.parametrize("command", ["train", "evaluate"])
 def test_a_corpus_that_cannot_be_used_is_one_clear_error_and_nothing_is_lost(copied, tmp_path, capsys, spoil, command):

@@ -57,6 +57,7 @@ def test_what_is_wrong_in_one_of_several_takes_is_said(entry, tmp_path):
         solve_corpus(Corpus(tmp_path, (row, TakeEntry(broken, "S1", "EU", annotation=row.annotation))))
 
 
+@pytest.mark.slow
 def test_a_corpus_named_from_another_folder_than_the_one_before_is_solved(tmp_path, monkeypatch):
     for name in ("one", "two"):
         shutil.copytree(bundled_corpus(), tmp_path / name / f"mini-{name}")

@@ -148,6 +148,7 @@ def test_a_cluster_that_loses_a_worker_ends_with_the_same_bytes(undisturbed, rea
     assert written(feel) == whole
 
 
+@pytest.mark.slow
 def test_the_second_run_has_nothing_to_do_and_a_new_export_is_done_alone(feel, ready):
     run_here(feel, ready)
     assert states(run_here(feel, ready)) == [BEFORE]
@@ -157,6 +158,7 @@ def test_the_second_run_has_nothing_to_do_and_a_new_export_is_done_alone(feel, r
     assert again == {"S1/S1-EU-J"}
 
 
+@pytest.mark.slow
 def test_what_an_annotator_corrected_stays_as_it_is(feel, ready, capsys):
     run_here(feel, ready)
     eaf = feel / "annotated" / "S1" / "S1-IE-J.eaf"
@@ -175,6 +177,7 @@ def test_what_an_annotator_corrected_stays_as_it_is(feel, ready, capsys):
     assert "1 corrected by hand and left alone" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_takes_that_fail_are_told_and_stop_no_other(feel, ready, capsys):
     (feel / "S1" / "S1-IE-A.csv").write_text("nonsense")
     (feel / "S2" / "S2-EU-D.csv").write_bytes(b"")
@@ -193,6 +196,7 @@ def test_takes_that_fail_are_told_and_stop_no_other(feel, ready, capsys):
     assert "S1-IE-A.csv" in log
 
 
+@pytest.mark.slow
 def test_two_runs_do_not_work_in_one_folder(feel, ready):
     first = run_corpus(read_corpus(feel), classifier=str(ready / "mine.skops"), workers=2)
     next(first)
@@ -224,12 +228,14 @@ def test_without_dask_the_extra_is_named(monkeypatch):
         next(on_cluster(abs, [1], scheduler="tcp://127.0.0.1:9"))
 
 
+@pytest.mark.slow
 def test_without_a_scheduler_at_the_address_there_is_one_clear_error(feel, ready, monkeypatch):
     monkeypatch.setattr("signface.corpus.cluster.PATIENCE_S", 1.0)
     with pytest.raises(SignfaceError, match="no Dask scheduler answers"):
         list(run_corpus(read_corpus(feel), classifier=str(ready / "mine.skops"), scheduler="tcp://127.0.0.1:9"))
 
 
+@pytest.mark.slow
 def test_a_failed_take_is_tried_again(feel, ready):
     take = feel / "S1" / "S1-IE-A.csv"
     good = take.read_bytes()
@@ -253,6 +259,7 @@ def test_a_job_that_kills_its_process_fails_alone():
     assert found == {number: number**2 for number in range(20) if number != 7}
 
 
+@pytest.mark.slow
 def test_channels_doubts_and_the_template_of_a_lab_are_written_as_annotate_writes_them(feel, ready, tmp_path):
     """And what is written otherwise is written again, but not solved again."""
     manifest = feel / "takes.csv"

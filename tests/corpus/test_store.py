@@ -276,6 +276,7 @@ def test_training_and_evaluation_take_what_is_stored(tmp_path, laugh):
     assert read_provenance(store.path(own))["origin"]["recording"] == own.recording
 
 
+@pytest.mark.slow
 def test_a_solved_take_is_stored_exactly(mini, tmp_path):
     from signface.solver.solving import solve
     from signface.takes.reading import read_take

@@ -31,6 +31,9 @@ from tests.conftest import REPOSITORY
 from tests.fixtures.elan_files import assert_valid
 from tests.fixtures.training import quick
 
+#: What all of them share takes long to make.
+pytestmark = pytest.mark.slow
+
 BROWS = Vocabulary("brows", ("up", "down"), {"up": "raised", "down": "lowered"}, {"up": (1, 2, 3), "down": (4, 5, 6)})
 
 

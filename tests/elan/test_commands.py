@@ -164,6 +164,7 @@ def test_a_mapping_of_two_labels_to_one_value_cannot_be_undone(tmp_path):
         read_reference(path, "S1")
 
 
+@pytest.mark.slow
 def test_agreement_is_printed_and_written(tmp_path, capsys):
     first, second = tmp_path / "eva.eaf", tmp_path / "tom.eaf"
     write_eaf(labelled("N NJ J JN N"), first, signer="S1")

@@ -276,6 +276,7 @@ def test_windows_paths_and_addresses_are_linked_too():
     assert link_urls("https://example.org/a.mp4", "a.eaf") == ("https://example.org/a.mp4", None)
 
 
+@pytest.mark.slow
 def test_a_long_take_comes_back_whole(tmp_path):
 
     path = tmp_path / "take.eaf"

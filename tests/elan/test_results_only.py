@@ -33,6 +33,7 @@ def annotation(mini):
     return sf.annotate(take, sf.load_model("default"), signer=sf.Signer("M1"), channels=True)
 
 
+@pytest.mark.slow
 def test_two_annotations_of_one_take_are_equal_and_name_their_solve(annotation, mini):
     again = sf.annotate(
         sf.read_take(mini.takes[0].path), sf.load_model("default"), signer=sf.Signer("M1"), channels=True
@@ -53,6 +54,7 @@ def same_files(first: Path, second: Path) -> None:
         assert texts[0] == texts[1], name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("door", ["new", "into"])
 def test_annotate_and_write_equals_the_command(door, annotation, mini, tmp_path):
     for folder in ("script", "command"):
@@ -69,6 +71,7 @@ def test_annotate_and_write_equals_the_command(door, annotation, mini, tmp_path)
     same_files(script.parent, command.parent)
 
 
+@pytest.mark.slow
 def test_a_template_of_the_laboratory_does_not_stand_in_the_way_of_into(annotation, mini, tmp_path):
     sf.write_eaf(annotation.segments, tmp_path / "lab.etf", signer="other")
     sf.write_eaf(annotation.segments, tmp_path / "take.eaf", signer="other")
@@ -135,6 +138,7 @@ def test_the_digest_of_options_follows_the_content_of_their_files(tmp_path):
     assert options.content_digest != before
 
 
+@pytest.mark.slow
 def test_the_script_of_the_manual_runs(mini, tmp_path, monkeypatch, capsys):
     text = (Path(__file__).parents[2] / "docs" / "elan.md").read_text("utf-8")
     script = text.partition("```python\n")[2].partition("```")[0]

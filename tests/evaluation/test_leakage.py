@@ -93,6 +93,7 @@ def test_random_labels_are_found_by_chance_only(prints, protocol, kinds, options
     assert scores["manual_segments"]["accuracy"] < BY_CHANCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_random_labels_are_found_by_chance_only_by_sequence_models(prints, protocol):
     metrics = evaluate_folds(protocol_folds(prints, protocol, ["EU"]), classifiers=["hmm"]).metrics

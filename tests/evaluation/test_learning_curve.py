@@ -24,6 +24,7 @@ def folds(examples, protocol):
     return folds_of(examples, protocol=protocol, train_kinds=["IE"], test_kinds=["EU"])
 
 
+@pytest.mark.slow
 def test_a_curve_grows_by_whole_takes_of_the_training_set_only(examples):
     trained_on = []
 
@@ -48,6 +49,7 @@ def test_signers_are_added_with_all_their_takes(examples):
     assert set(curve["by"]) == {"signers"}
 
 
+@pytest.mark.slow
 def test_the_cost_of_a_curve_is_bounded(examples):
     counted = []
 

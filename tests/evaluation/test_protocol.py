@@ -127,6 +127,7 @@ def test_a_take_in_both_sets_is_refused(examples):
         Fold("S1", tuple(examples[:2]), tuple(examples[1:3]))
 
 
+@pytest.mark.slow
 def test_a_kind_that_is_trained_on_and_tested_is_tested_in_turns(examples):
     found = folds_of(examples, protocol="within", train_kinds=["IE", "EU"], test_kinds=["EU"], turns=3)
     tested = [e.take for fold in found for e in fold.test]

@@ -97,6 +97,7 @@ def test_candide_gives_animation_units_as_bases_and_shape_units_as_identities():
     assert check_face(cleaned).clean
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 2**31), st.sampled_from([".glb", ".gltf", ".wfm"]), st.booleans())
 def test_random_or_cut_files_are_refused_in_one_line(tmp_path, seed, ending, cut):
@@ -113,6 +114,7 @@ def test_random_or_cut_files_are_refused_in_one_line(tmp_path, seed, ending, cut
     assert "bad" in str(caught.value)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 2**31))
 def test_a_damaged_glb_is_read_or_refused_but_never_crashes(tmp_path, seed):

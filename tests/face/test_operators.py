@@ -31,6 +31,7 @@ def test_subdivision_keeps_area_vertices_and_the_motion_of_markers(face):
     assert np.abs(coarse - dense).max() < 1e-4  # millimetres: the layout is written to 1e-5
 
 
+@pytest.mark.slow
 def test_stretching_and_bending_hardly_change_with_the_mesh(face):
     for coarse, fine in zip(thin_shell_matrices(face), thin_shell_matrices(subdivide(face))):
         assert np.linalg.eigvalsh(coarse).min() > -1e-9 * np.trace(coarse)

@@ -35,6 +35,7 @@ def test_too_few_markers_are_refused():
         suggest_layout(["a", "b", "c"], np.eye(3), read_face("default"))
 
 
+@pytest.mark.slow
 def test_a_written_layout_is_read_back(tmp_path):
     face = read_face("default")
     layout = read_layout("mediapipe", face)

@@ -132,6 +132,7 @@ def test_a_model_keeps_its_intensities_on_disk_and_annotates_them(takes, tmp_pat
     assert set(one["intensity"].dropna()) == {1, 2, 3}
 
 
+@pytest.mark.slow
 def test_annotate_writes_what_the_classifier_has_learnt_into_the_tier_of_intensities(takes, tmp_path):
     entries = []
     for e in takes:

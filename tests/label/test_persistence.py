@@ -41,6 +41,7 @@ def saved(takes, tmp_path_factory):
     return file
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_loaded_model_answers_like_the_saved_one(name, takes, tmp_path):
     model = train(takes, quick(name), corpus="toy", scores={"of a test": 0.5})
@@ -217,6 +218,7 @@ def as_before(model, file):
         old.writestr(CARD, json.dumps(asdict(model.card)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("classifier", ["knn1", "crf", "net-hsmm"])
 def test_a_file_of_an_older_version_answers_like_todays(classifier, tmp_path):
     takes = corpus(("S1", "S2"))
@@ -235,6 +237,7 @@ def test_a_file_of_an_older_version_answers_like_todays(classifier, tmp_path):
     assert (tmp_path / "again.skops").read_bytes() == (tmp_path / "today.skops").read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "classifier"), [("default", "gru"), ("thesis-forest", "forest")])
 def test_the_shipped_classifiers_are_written_as_save_model_writes_them(name, classifier, tmp_path):
     file = shipped("classifiers", ".skops")[name]

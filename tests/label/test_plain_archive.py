@@ -104,6 +104,7 @@ def test_arrays_of_objects_are_not_unpickled():
         read_plain(archive(entries | {"labels.classes_.npy": content.getvalue()}))
 
 
+@pytest.mark.slow
 def test_help_and_solving_import_no_learning():
     code = """
 import sys

@@ -136,6 +136,7 @@ def test_a_sequence_model_takes_no_other_features():
         train(takes, quick("hmm", features=("weights", "windows")))
 
 
+@pytest.mark.slow
 def test_an_evaluation_normalises_signers_by_their_test_takes():
     examples = corpus()
     folds = folds_of(examples, protocol="across", train_kinds=["IE"], test_kinds=["EU"])

@@ -88,6 +88,7 @@ def test_a_vocabulary_is_the_same_after_json_pickle_and_a_list_of_its_entries(vo
         assert listed == vocabulary
 
 
+@pytest.mark.slow
 @given(vocabularies(), st.integers(1, 40))
 def test_every_value_has_a_colour_and_none_shares_it_with_another(vocabulary, count):
     assert {value: vocabulary.palette[value] for value in vocabulary.colours} == vocabulary.colours

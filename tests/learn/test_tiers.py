@@ -40,6 +40,7 @@ def examples():
     return [on_brows(example) for example in corpus()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("classifier", ["knn3", "forest", *(name for name in SEQUENCE_NAMES if name != "gru")])
 def test_every_classifier_learns_a_tier_without_transitions(examples, classifier, tmp_path):
     parameters = {"iterations": 25} if classifier == "crf" else {}
@@ -62,6 +63,7 @@ def test_every_classifier_learns_a_tier_without_transitions(examples, classifier
     assert load_model(tmp_path / "brows.skops").card.vocabulary == BROWS
 
 
+@pytest.mark.slow
 def test_chance_and_labels_are_those_of_the_vocabulary(examples):
     metrics = evaluate(examples, quick(), protocols=["within"], train_kinds=["IE"], classifiers=["knn1"]).metrics
     scores = metrics["classifiers"]["knn1"]
@@ -73,6 +75,7 @@ def test_chance_and_labels_are_those_of_the_vocabulary(examples):
     assert scores["frames"]["accuracy"] > 0.8
 
 
+@pytest.mark.slow
 def test_the_order_of_the_vocabulary_changes_only_the_order(examples):
     turned = dataclasses.replace(BROWS, values=BROWS.values[::-1])
     other = [dataclasses.replace(example, vocabulary=turned) for example in examples]
@@ -86,6 +89,7 @@ def test_the_order_of_the_vocabulary_changes_only_the_order(examples):
         }
 
 
+@pytest.mark.slow
 def test_what_is_not_annotated_is_unknown_where_annotation_is_sparse():
     vocabulary = Vocabulary("brows", ("raised", "lowered"))
     sparse = [on_brows(example, sparse=True, vocabulary=vocabulary) for example in corpus()]

@@ -84,6 +84,7 @@ def test_frames_without_weights_are_not_trained_on():
     assert np.isfinite(frames).all()
 
 
+@pytest.mark.slow
 def test_the_order_of_the_takes_does_not_matter(takes):
     unseen = example(["N", "J", "A", "Su"], seed=5).descriptors.weights
     one, other = train(takes, quick()), train(takes[::-1], quick())

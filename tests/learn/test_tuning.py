@@ -110,6 +110,7 @@ def test_a_search_finds_the_parameter_that_works(monkeypatch):
     assert model.card.parameters == {"C": 1.0}
 
 
+@pytest.mark.slow
 def test_a_sequence_model_is_searched_too():
     takes = [e for e in corpus(("S1",), hold=0.6) if e.kind == "IE"]
     model = train(takes, quick("hmm", search=True, folds=2))
@@ -122,6 +123,7 @@ def test_one_take_cannot_be_searched_over():
         train([example(["N", "J", "A"])], quick(search=True))
 
 
+@pytest.mark.slow
 def test_balanced_training_finds_more_of_what_is_rare():
     """Two expressions of one kind, of which one is rare: weighted alike, the rare one is called more often."""
     rng = np.random.default_rng(0)

@@ -119,6 +119,7 @@ def test_chance_keeps_the_margins_and_leaves_the_impossible_cell_empty():
     assert odds == pytest.approx(1.0)  # quasi-independence: no association where there may be one
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(annotations(), annotations())
 def test_every_measure_is_symmetric(first, second):

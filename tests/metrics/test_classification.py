@@ -15,6 +15,7 @@ LABELS = list(AFFECT.values)
 pairs = st.lists(st.tuples(st.sampled_from(LABELS), st.sampled_from(LABELS)), min_size=1, max_size=60)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(pairs=pairs)
 def test_metrics_agree_with_those_of_scikit_learn(pairs):

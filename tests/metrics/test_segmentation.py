@@ -35,6 +35,7 @@ def segmentations(draw, start=0.0):
     return table(start + np.concatenate([[0], np.cumsum(steps)]))
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(one=segmentations())
 def test_a_segmentation_agrees_with_itself(one):
@@ -42,6 +43,7 @@ def test_a_segmentation_agrees_with_itself(one):
         assert measure(one, one) == pytest.approx(1)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(one=segmentations(), other=segmentations())
 def test_measures_are_symmetric_and_lie_between_0_and_1(one, other):
@@ -51,6 +53,7 @@ def test_measures_are_symmetric_and_lie_between_0_and_1(one, other):
         assert value == pytest.approx(measure(other, one))
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(one=segmentations(), other=segmentations(), tolerances=st.lists(st.floats(0, 2), min_size=2, max_size=4))
 def test_boundaries_agree_no_less_when_more_is_tolerated(one, other, tolerances):
@@ -58,6 +61,7 @@ def test_boundaries_agree_no_less_when_more_is_tolerated(one, other, tolerances)
     assert values == sorted(values)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(one=segmentations(), other=segmentations(), shift=st.floats(-100, 100))
 def test_measures_do_not_depend_on_where_time_begins(one, other, shift):

@@ -54,6 +54,7 @@ def test_rows_of_trajectories_keep_the_distances_of_the_normalised_ones(actors, 
     assert np.abs(near - true).max() < 0.02 * true.max()
 
 
+@pytest.mark.slow
 def test_a_marker_stands_within_its_own_cluster(face, material):
     found = material.clusters(20)
     place = {int(vertex): row for row, vertex in enumerate(material.sites.clustered)}
@@ -61,6 +62,7 @@ def test_a_marker_stands_within_its_own_cluster(face, material):
         assert found.members[place[vertex]] == number
 
 
+@pytest.mark.slow
 def test_one_seed_gives_one_layout(material):
     assert material.clusters(12, seed=3).markers == material.clusters(12, seed=3).markers
 
@@ -76,6 +78,7 @@ def test_the_clusters_do_not_depend_on_the_scale_of_a_motion(actors, face):
     assert np.allclose(own @ own.T, larger @ larger.T, atol=1e-6 * (own @ own.T).max())
 
 
+@pytest.mark.slow
 def test_each_marker_lowers_the_reconstruction_error_by_what_was_promised(material):
     criterion = material.criterion("greedy", 10)
     for _ in range(4):
@@ -111,6 +114,7 @@ def test_the_reconstruction_error_is_that_of_linear_regression(face, material, a
     assert criterion.error == pytest.approx(expected, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_a_thin_shell_passes_through_its_handles(material):
     criterion = material.criterion("thin-shell", 10)
     assert isinstance(criterion, ThinShell)
@@ -122,6 +126,7 @@ def test_a_thin_shell_passes_through_its_handles(material):
     assert criterion.error < before
 
 
+@pytest.mark.slow
 @settings(max_examples=8, deadline=None)
 @given(st.integers(0, 10_000))
 def test_information_only_grows(material, seed):

@@ -184,6 +184,7 @@ def test_one_command_makes_the_report_and_a_second_run_resumes(tmp_path, capsys,
     assert (tmp_path / "report.html").read_text() == page
 
 
+@pytest.mark.slow
 def test_the_command_says_in_a_line_what_cannot_be(tmp_path, capsys):
     command = ["layout", "optimise", "--seconds", "6", "--actors", "1", "--method", "d-optimal"]
     assert main([*command, "--markers", "5000", "-o", str(tmp_path / "x.csv")]) == 2

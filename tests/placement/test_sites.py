@@ -37,6 +37,7 @@ def test_an_empirical_layout_is_symmetric(face, name):
     assert apart.max() < 0.6
 
 
+@pytest.mark.slow
 def test_the_manual_layouts_lie_within_one_another(face):
     families = [set(place_layout(f"man-{size}", face).face_labels) for size in (15, 30, 46, 62)]
     assert all(small < large for small, large in itertools.pairwise(families))

@@ -155,6 +155,7 @@ def test_the_face_turns_as_a_whole_and_the_necks_end_stays(face):
     assert (Neck(mask).share == 1).all()
 
 
+@pytest.mark.slow
 def test_the_command_nods_unless_told_otherwise(face, nod, tmp_path, monkeypatch, capsys):
     from signface.cli.main import main
 

@@ -23,6 +23,9 @@ from signface.report.evaluation.words import headline, limits, training_words
 from signface.segmentation.segments import Segments
 from tests.fixtures.hand_made import corpus
 
+#: What all of them share takes long to make.
+pytestmark = pytest.mark.slow
+
 SECTIONS = (
     "summary", "contents", "done", "accuracy", "segmentation", "confusions", "signers", "comparison", "confidence",
     "curve", "importance", "worst", "reading", "provenance",

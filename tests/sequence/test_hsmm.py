@@ -23,6 +23,9 @@ from signface.settings.choices import SEQUENCE_NAMES
 from tests.fixtures.hand_made import corpus, example
 from tests.fixtures.training import quick
 
+#: What all of them share takes long to make.
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def takes():

@@ -168,6 +168,7 @@ def labels(path) -> list[tuple[float, float, str]]:
     return [(round(row.start_s, 3), round(row.end_s, 3), row.label) for row in table.itertuples()]
 
 
+@pytest.mark.slow
 def test_all_doors_give_one_answer(laboratory, tmp_path):
     take, model, settings = laboratory / "M2_EU_04.c3d", laboratory / "model.skops", laboratory / "lab.toml"
     common = ["--classifier", str(model), "--settings", str(settings)]
@@ -213,6 +214,7 @@ def recognised(laboratory, tmp_path) -> list[str]:
     return [span.findtext("v") for span in tiers.iter("span")]
 
 
+@pytest.mark.slow
 def test_a_model_that_meets_another_solve_says_so(laboratory, tmp_path, capsys):
     take, model = laboratory / "M2_EU_04.c3d", laboratory / "model.skops"
     assert main(["annotate", str(take), "-o", str(tmp_path / "a.eaf"), "--classifier", str(model)]) == 0
@@ -224,6 +226,7 @@ def test_a_model_that_meets_another_solve_says_so(laboratory, tmp_path, capsys):
     assert "otherwise" not in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_signers_bases_count_at_every_door(laboratory, tmp_path):
     face_bases = pd.DataFrame(
         [("jawOpen", f"M{i:02d}", 0.0, -9.0, 1.0) for i in range(40)], columns=["base", "marker", "x", "y", "z"]
@@ -250,6 +253,7 @@ def test_a_signers_bases_count_at_every_door(laboratory, tmp_path):
     np.testing.assert_allclose(example.descriptors.weights, with_bases.weights, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_signers_file_is_read_to_the_last_bit(laboratory, tmp_path):
     signer = Signer.read(laboratory / "M2.json")
     again = Signer.read(signer.save(tmp_path / "again.json"))
@@ -261,12 +265,14 @@ def test_a_signers_file_is_read_to_the_last_bit(laboratory, tmp_path):
             Signer.read(tmp_path / "bad.json")
 
 
+@pytest.mark.slow
 def test_another_value_is_another(laboratory):
     for kind in (SolveSettings, TrainingSettings, EafOptions):
         for item in fields(kind):
             assert getattr(kind(), item.name) != another_value(item)
 
 
+@pytest.mark.slow
 def test_the_level_of_a_corpuss_signer_counts_where_its_takes_are_learnt_from(laboratory, tmp_path):
     folder = tmp_path / "corpus"
     (folder / "signers").mkdir(parents=True)
@@ -291,6 +297,7 @@ def test_the_manual_lists_every_setting():
             assert item.metadata["help"] in text
 
 
+@pytest.mark.slow
 def test_what_makes_labels_differ_is_said(laboratory, tmp_path, capsys):
     take, known = str(laboratory / "M2_EU_04.c3d"), str(laboratory / "M2.json")
     common = [

@@ -57,6 +57,7 @@ def joined(parts, field):
     return np.concatenate([getattr(part, field) for part in parts])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("piece", [333])
 def test_pieces_give_the_weights_of_the_whole(piece, gappy, face, layout):
     whole = solve(gappy, face, layout)
@@ -77,6 +78,7 @@ def test_cleaning_in_pieces_is_cleaning_the_take(gappy, layout):
     assert clean.history == whole.history
 
 
+@pytest.mark.slow
 def test_a_filter_that_needs_the_whole_take_gets_it(gappy, face, layout):
     options = {"settings": SolveSettings(neutral=0.33, filter_method="raised-sine")}
     whole = solve(gappy, face, layout, **options)

@@ -64,6 +64,7 @@ def test_weights_do_not_depend_on_the_unit_of_length(face, layout, solver, displ
     assert metres.residual == pytest.approx(millimetres.residual / 1000, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("alpha", "most"), [(0.3, 0.002), (0.9, 0.03)])
 def test_weights_hardly_depend_on_how_finely_the_face_is_meshed(face, layout, displacements, alpha, most):
     finer = subdivide(face)

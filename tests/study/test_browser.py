@@ -111,6 +111,7 @@ def wrong_in_console(browser) -> list[str]:
     return [entry["message"] for entry in browser.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")]
 
 
+@pytest.mark.slow
 @needs_chromium
 @pytest.mark.parametrize(("name", "films"), [("group-1", 18), ("group-2a", 18), ("group-2b", 12)])
 def test_a_browser_takes_a_questionnaire_of_the_thesis(new_browser, tmp_path, name, films):
@@ -143,6 +144,7 @@ def test_a_browser_takes_a_questionnaire_of_the_thesis(new_browser, tmp_path, na
     assert len(answers) == len(study.personal) + asked
 
 
+@pytest.mark.slow
 @needs_chromium
 def test_a_browser_resumes_in_the_middle_on_a_telephone(new_browser, tmp_path):
     shipped_study("group-2a", tmp_path, small_film(), intensities="[2]")
@@ -174,6 +176,7 @@ def test_a_browser_resumes_in_the_middle_on_a_telephone(new_browser, tmp_path):
         assert "100 %" in first.find_element("css selector", "main").text
 
 
+@pytest.mark.slow
 @needs_chromium
 def test_a_page_is_answered_with_the_keyboard_alone(new_browser, tmp_path):
     from selenium.webdriver.common.keys import Keys
@@ -204,6 +207,7 @@ def test_a_page_is_answered_with_the_keyboard_alone(new_browser, tmp_path):
     store.close()
 
 
+@pytest.mark.slow
 @needs_chromium
 def test_a_page_that_is_sent_unanswered_says_what_is_missing(new_browser, tmp_path):
     shipped_study("group-1", tmp_path, small_film(), intensities="[2]")

@@ -36,6 +36,7 @@ def test_sqlite_keeps_a_log_and_waits_for_the_disk(tmp_path):
     store.close()
 
 
+@pytest.mark.slow
 def test_a_server_that_is_killed_loses_no_acknowledged_answer(tmp_path):
     write_study(tmp_path)
     acknowledged, stop = [], threading.Event()
@@ -107,6 +108,7 @@ def test_a_crowd_loses_no_answer_in_postgresql(tmp_path, database):
     assert len(output.read_text().splitlines()) >= 1 + 15 * 6
 
 
+@pytest.mark.slow
 def test_postgresql_follows_the_same_rules(tmp_path, database):
     site = Site(tmp_path, store=open_store(database))
     browser = site.browser()
@@ -132,6 +134,7 @@ def test_postgresql_follows_the_same_rules(tmp_path, database):
     site.store.close()
 
 
+@pytest.mark.slow
 def test_many_clicks_at_once_are_one_answer_in_sqlite(tmp_path):
     site = Site(tmp_path)
     browser = site.browser()

@@ -9,6 +9,9 @@ import pytest
 
 from tests.fixtures.study_site import Site, write_study
 
+#: What all of them share takes long to make.
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("starlette", reason="needs the extra study")
 
 

@@ -83,6 +83,7 @@ def test_constant_answers_make_no_model():
         OrdinalMixedModel([4, 4, 4], np.zeros((3, 0)), [])
 
 
+@pytest.mark.slow
 def test_a_planted_difference_is_found_and_its_size_recovered():
     design = crossed_design("two", ["A", "B"], ["answer_intensity"], 24)
     effects = Effects({("B", "answer_intensity"): -0.5}, participants=0.6, reactions=0.1)
@@ -122,6 +123,7 @@ def test_the_same_seed_gives_the_same_interval():
     assert participant_interval(table, "y", seed=3) != participant_interval(table, "y", seed=4)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=20)
 @given(st.floats(0.1, 2), st.integers(5, 60))
 def test_the_number_of_participants_that_find_a_difference_undoes_the_difference_they_find(spread, participants):
@@ -131,6 +133,7 @@ def test_the_number_of_participants_that_find_a_difference_undoes_the_difference
     assert participants_needed(difference / 2, spread) > participants
 
 
+@pytest.mark.slow
 def test_power_is_that_of_a_simulated_study():
     """Normal differences of 30 participants: Wilcoxon's test finds the promised one in about 80 % of studies."""
     from signface.study.statistics.rank_tests import wilcoxon

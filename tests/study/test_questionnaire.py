@@ -26,6 +26,7 @@ def site(tmp_path):
     made.store.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "films", "methods"),
     [
@@ -74,6 +75,7 @@ def test_every_participant_has_an_order_of_their_own_that_can_be_found_again(tmp
     assert 20 < sum(places) / len(places) < 33  # the first film of the list stands anywhere, 26.5 on average
 
 
+@pytest.mark.slow
 def test_someone_who_closes_the_browser_resumes_by_the_private_link(site):
     first = site.browser()
     first.to_the_first_film()

@@ -21,6 +21,9 @@ from signface.study.statistics.analysis import Analysis, analyse
 from signface.study.statistics.simulation import Effects, simulate, thesis_design
 from signface.study.statistics.tables import StudyTable, as_latex, as_text, write_cell
 
+#: What all of them share takes long to make.
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def study() -> Analysis:

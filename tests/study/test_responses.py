@@ -214,6 +214,7 @@ def test_stimuli_shared_by_methods_pair_by_stimulus_and_films_by_what_was_played
     assert set(responses.item()) == set(shared["stimulus"])
 
 
+@pytest.mark.slow
 def test_the_analysis_does_not_depend_on_the_order_of_rows_nor_on_names():
     table = simulate(crossed_design("two", ["A", "B"], FOUR, 6), Effects({("B", "*"): 0.4}), seed=5)
     shuffled = table.sample(frac=1, random_state=1)

@@ -117,11 +117,13 @@ def rejections(effects: Effects, studies: int = 16, participants: int = 12) -> d
     return {name: float(np.mean(values)) for name, values in found.items()}
 
 
+@pytest.mark.slow
 def test_without_an_effect_every_test_finds_one_in_about_a_twentieth_of_studies():
     found = rejections(Effects(participants=0.5))
     assert all(share <= 0.2 for share in found.values()), found  # of 16 studies, more than 3 have a chance of 1 in 140
 
 
+@pytest.mark.slow
 def test_when_participants_react_differently_only_tests_that_know_participants_keep_their_level():
     found = rejections(Effects(participants=0.5, reactions=0.8))
     assert found["kruskal"] > 0.3
@@ -129,6 +131,7 @@ def test_when_participants_react_differently_only_tests_that_know_participants_k
     assert all(found[name] <= 0.2 for name in ("mixed", "averaged", "people")), found
 
 
+@pytest.mark.slow
 def test_what_belongs_to_participants_is_found_too_often_over_answers_and_not_over_participants():
     design = crossed_design("null", ["A"], ["answer_difficulty"], 20)
     over_answers, over_people = [], []

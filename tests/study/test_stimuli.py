@@ -51,6 +51,7 @@ def study_folder(tmp_path, mini, face):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_one_command_makes_every_film_of_a_study(study_folder, capsys):
     assert main(["study", "render", str(study_folder)]) == 0
     study = read_study(study_folder)  # no film is missing
@@ -79,6 +80,7 @@ def test_a_mistake_in_how_films_are_made_is_said(study_folder, before, after, sa
         plan_films(read_study(study_folder, films=False))
 
 
+@pytest.mark.slow
 def test_stimuli_keep_the_head_still_unless_the_study_lets_it_move(study_folder, face, capsys):
     def films() -> dict[str, bytes]:
         assert main(["study", "render", str(study_folder)]) == 0

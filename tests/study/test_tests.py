@@ -99,6 +99,7 @@ def test_scheirer_ray_hare_on_unequal_cells_adjusts_each_factor_for_the_other():
 # --- agreement with other libraries --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_tests_agree_with_statsmodels():
     multitest = pytest.importorskip("statsmodels.stats.multitest")
     tables = pytest.importorskip("statsmodels.stats.contingency_tables")
@@ -171,6 +172,7 @@ def results_of(answers, first, second):
     ]
 
 
+@pytest.mark.slow
 @quick
 @given(two_factors())
 def test_p_values_lie_between_0_and_1_and_effects_between_minus_1_and_1(data):
@@ -180,6 +182,7 @@ def test_p_values_lie_between_0_and_1_and_effects_between_minus_1_and_1(data):
         assert math.isnan(result.p) == any(reason.startswith("not made") for reason in result.violated)
 
 
+@pytest.mark.slow
 @quick
 @given(two_factors(), st.randoms(use_true_random=False))
 def test_the_order_of_the_answers_does_not_matter(data, random):
@@ -194,6 +197,7 @@ def test_the_order_of_the_answers_does_not_matter(data, random):
     assert spearman(codes, answers).p == pytest.approx(spearman(codes[order], answers[order]).p, abs=1e-9, nan_ok=True)
 
 
+@pytest.mark.slow
 @quick
 @given(two_factors())
 def test_the_names_of_levels_and_the_order_of_factors_do_not_matter(data):
@@ -205,6 +209,7 @@ def test_the_names_of_levels_and_the_order_of_factors_do_not_matter(data):
         assert before.df == after.df
 
 
+@pytest.mark.slow
 @quick
 @given(two_factors())
 def test_rank_tests_do_not_change_when_the_scale_is_stretched(data):
@@ -214,6 +219,7 @@ def test_rank_tests_do_not_change_when_the_scale_is_stretched(data):
         assert before.statistic == pytest.approx(after.statistic, abs=1e-8, nan_ok=True)
 
 
+@pytest.mark.slow
 @quick
 @given(st.lists(st.tuples(likert, likert), min_size=1, max_size=60))
 def test_wilcoxon_changes_sign_when_the_methods_change_places(pairs):
@@ -224,6 +230,7 @@ def test_wilcoxon_changes_sign_when_the_methods_change_places(pairs):
     assert there.n == int((first != second).sum())
 
 
+@pytest.mark.slow
 @quick
 @given(st.lists(st.floats(0, 1), min_size=0, max_size=12), st.integers(0, 3))
 def test_holm_never_lowers_a_p_value_and_keeps_their_order(p_values, missing):

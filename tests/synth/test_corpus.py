@@ -39,6 +39,7 @@ def files(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes(mini, tmp_path):
     make_signer.cache_clear()
     synthesise(tmp_path / "again", mini=True)
@@ -59,6 +60,7 @@ def test_the_shipped_corpus_is_what_the_command_makes(mini):
             np.testing.assert_allclose(read_take(mini / name).positions, read_take(shipped / name).positions, atol=1e-2)
 
 
+@pytest.mark.slow
 def test_another_seed_gives_other_signers():
     takes = [make_take(TakeRequest(seed, 0, "EU", 5)).take for seed in (0, 1)]
     assert takes[0].n_frames != takes[1].n_frames
@@ -105,6 +107,7 @@ def test_an_utterance_is_signed_three_times_with_its_affects():
         assert len(plan.clauses) == 3
 
 
+@pytest.mark.slow
 def test_recordings_come_back_from_c3d_in_millimetres(mini):
     for request in plan_mini():
         made = make_take(request).take
@@ -140,6 +143,7 @@ def test_reference_annotations_say_affect_and_intensity(mini):
         assert stable.loc[stable["label"] == "N", "intensity"].isna().all()
 
 
+@pytest.mark.slow
 def test_the_annotator_is_uncertain_by_tens_of_milliseconds():
     errors = []
     for request in plan_corpus(signers=1, seed=3, kinds=["IE"]):
@@ -171,6 +175,7 @@ def test_the_truth_is_kept_beside_every_take(mini):
         assert len(boundaries) == len(read_reference(entry.annotation, entry.signer))
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_corpus_and_says_so(tmp_path, capsys):
     folder = tmp_path / "small"
     assert main(["synth", str(folder), "--mini"]) == 0
@@ -199,6 +204,7 @@ def test_a_corpus_of_other_settings_is_left_alone(mini):
     assert files(mini) == before
 
 
+@pytest.mark.slow
 def test_what_an_annotator_corrected_is_never_overwritten(tmp_path):
     synthesise(tmp_path, mini=True)
     annotation = read_corpus(tmp_path).takes[0].annotation

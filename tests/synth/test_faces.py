@@ -118,6 +118,7 @@ def test_markers_are_glued_one_to_three_millimetres_off(avatar, signer):
     assert on_a_vertex.mean() < 0.1
 
 
+@pytest.mark.slow
 def test_markers_jitter_by_tenths_of_a_millimetre():
     take = make_take(TakeRequest(11, 0, "IE", 3)).take
     still = take.positions[20:120]
@@ -127,6 +128,7 @@ def test_markers_jitter_by_tenths_of_a_millimetre():
     assert jitter.max() < 0.40
 
 
+@pytest.mark.slow
 def test_lost_markers_come_back_within_some_tenths_of_a_second():
     lengths = []
     for number in range(4):
@@ -140,6 +142,7 @@ def test_lost_markers_come_back_within_some_tenths_of_a_second():
     assert np.quantile(lengths, 0.95) < 0.33
 
 
+@pytest.mark.slow
 def test_weights_stay_between_nothing_and_everything(avatar):
     for seed, number in ((0, 3), (1, 16)):
         habits = make_signer(seed, 0, Spread()).habits
@@ -151,6 +154,7 @@ def test_weights_stay_between_nothing_and_everything(avatar):
         assert np.abs(np.diff(weights, axis=0)).max() < 0.5  # no base jumps within 10 ms
 
 
+@pytest.mark.slow
 def test_utterances_move_the_mouth_and_the_head_more_than_isolated_expressions():
     uttered, isolated = make_take(TakeRequest(11, 0, "EU", 9)), make_take(TakeRequest(11, 0, "IE", 3))
     jaw = uttered.weights.names.index("jawOpen")

@@ -95,6 +95,7 @@ def test_the_documented_reader_refuses_damaged_files_with_one_clear_line(facedot
         assert printed.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_the_command_line_reads_a_format_that_an_installed_package_brings(facedots, tmp_path):
     project = tomllib.loads(documented("[build-system]"))
     assert project["project"]["entry-points"][registry.ENTRY_POINTS] == {"facedots": "facedots"}
@@ -114,6 +115,7 @@ def open_it(path, *, unit=None):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("before", ["", "import ours; "], ids=["installed", "and imported"])
 def test_among_equals_a_scripts_reader_goes_before_an_installed_one_and_that_before_a_shipped_one(tmp_path, before):
     write_table(TAKE, tmp_path / "take.csv")
@@ -124,6 +126,7 @@ def test_among_equals_a_scripts_reader_goes_before_an_installed_one_and_that_bef
     assert "7 frames at 25 Hz" in command(tmp_path, *words, before=f"import script; {before}").stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "reader",
     ["import absent_module", "this is no Python", r"raise RuntimeError('two\nlines')"],

@@ -62,6 +62,7 @@ def in_pieces(recording, length):
     return np.concatenate([block.positions for block in blocks]), None if heads[0] is None else np.concatenate(heads)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STAGES)
 @pytest.mark.parametrize("length", [1, 7, 83, 250, 599])
 def test_a_stage_in_pieces_of_any_length_is_the_stage_in_memory(name, length, stages, gappy):
