@@ -90,8 +90,6 @@ def run(arguments: argparse.Namespace) -> int:
         channels = read_channels(options.channels)
     signer, settings = signer_from(arguments), settings_from(arguments, SolveSettings)
     _import_shared()
-    from signface.elan.writing import write_eaf
-
     failed = 0
     with ThreadPoolExecutor(1) as beside:
         model = beside.submit(_load_model, arguments.classifier)
@@ -109,6 +107,8 @@ def run(arguments: argparse.Namespace) -> int:
                     open_recording(take), face, layout, settings=settings, signer=signer
                 )
                 result = annotate(descriptors, model.result(), signer=signer, channels=channels)
+                from signface.elan.writing import write_eaf  # imported beside the solve, by _load_model
+
                 write_eaf(result, path, into=into, options=options, video=arguments.video, replace=arguments.replace)
                 if arguments.figure:
                     save_picture(result, face, file.with_suffix(".png"))
