@@ -213,7 +213,7 @@ def annotate(
 
         name = "default" if channels is True else channels
         thresholds = name if isinstance(name, Mapping) else read_channels(name)
-        events = {event.channel: event for event in find_channels(descriptors, thresholds)}
+        events = {event.channel: event for event in find_channels(descriptors, thresholds, level=signer.level)}
         if "intensity" in thresholds and "intensity" not in segments.table and model.card.tier == "affect":
             segments = find_intensities(descriptors, segments, thresholds)
     return Annotation(descriptors, segments, model.name, events, signer, model.card)

@@ -2,7 +2,6 @@
 
 - `Signer`: all that is known of one, in one object that every door takes; `Signer.read` and `Signer.save`.
 - `SignerBases`: bases as one signer shows them, at named markers, from `signface calibrate`.
-- `SignerLevel`, `signer_level`: where a signer's weights lie and how far they move, without any label.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
@@ -21,6 +20,7 @@ import numpy as np
 from signface.content import Content
 from signface.errors import SignfaceError
 from signface.files import whole_file
+from signface.signer_level import SignerLevel, SignerRest, signer_level
 
 if TYPE_CHECKING:
     from signface.descriptors import Descriptors
@@ -123,56 +123,6 @@ class SignerBases(Content):
         return placed
 
 
-@dataclass(frozen=True, eq=False)
-class SignerLevel(Content):
-    """How a signer's weights lie, whatever is expressed.
-
-    Parameters
-    ----------
-    names : (N,) tuple of str
-        The bases.
-    mean, spread : (N,) arrays
-        Mean and standard deviation of the weight of each base over all frames.
-    solve : mapping
-        The `SolveSettings` of the takes, as plain values; empty where they are not known or differ.
-    """
-
-    names: tuple[str, ...]
-    mean: np.ndarray
-    spread: np.ndarray
-    solve: Mapping[str, Any] = field(default_factory=dict)
-
-
-def signer_level(takes: Sequence[Descriptors]) -> SignerLevel:
-    """Mean and spread of the weights of a signer over some takes; every frame counts the same time.
-
-    No label is looked at, so that takes that are to be labelled can be used.
-
-    Raises
-    ------
-    SignfaceError
-        There is no take, none has a frame with weights, or they have other bases.
-    """
-    if not takes:
-        raise SignfaceError("there is no take of the signer to normalise by")
-    names = takes[0].names
-    seconds, total, squares = 0.0, np.zeros(len(names)), np.zeros(len(names))
-    for take in takes:
-        if set(take.names) != set(names):
-            raise SignfaceError(f"{take.name} was solved with other bases than {takes[0].name}")
-        weights = take.on(names).weights
-        weights = weights[np.isfinite(weights).all(axis=1)]
-        seconds += len(weights) / take.rate
-        total += weights.sum(axis=0) / take.rate
-        squares += (weights**2).sum(axis=0) / take.rate
-    if not seconds:
-        raise SignfaceError(f"{takes[0].name}: no frame has weights", hint="look at the markers: signface take info")
-    mean = total / seconds
-    solves = [{} if take.settings is None else take.settings.as_dict() for take in takes]
-    alike = all(not take.settings.differences(solves[0]) for take in takes if take.settings is not None)
-    return SignerLevel(names, mean, np.sqrt((squares / seconds - mean**2).clip(0)), solves[0] if alike else {})
-
-
 @dataclass(frozen=True)
 class Signer:
     """A signer: what tiers are called, bases of their own, and where their face rests.
@@ -186,6 +136,9 @@ class Signer:
     level : SignerLevel, optional
         Where their weights lie over all their takes. A classifier that normalises signers needs it; without it, each
         take is normalised by itself alone.
+    rest : SignerRest, optional
+        Where the landmarks of their resting face are, over all their takes. Without it each take's own neutral frame
+        serves, which may lie in the middle of an expression.
 
     Raises
     ------
@@ -206,6 +159,7 @@ class Signer:
     name: str = ""
     bases: SignerBases | None = None
     level: SignerLevel | None = None
+    rest: SignerRest | None = None
 
     def __post_init__(self) -> None:
         if self.bases is not None and not isinstance(self.bases, SignerBases):
@@ -219,6 +173,11 @@ class Signer:
     def bases_digest(self) -> str:
         """SHA-256 of the bases, wherever they were read; empty where there are none."""
         return self._digest_of("bases")
+
+    @property
+    def solving_digest(self) -> str:
+        """SHA-256 of what changes the weights of a take, bases and rest; empty where there is neither."""
+        return self.bases_digest if self.rest is None else f"{self.bases_digest}+{self._digest_of('rest')}"
 
     @property
     def level_digest(self) -> str:
@@ -235,9 +194,9 @@ class Signer:
             rows = zip(self.bases.bases, self.bases.markers, self.bases.displacements.tolist(), strict=True)
             plain["bases"] = [[base, marker, *displacement] for base, marker, displacement in rows]
         if self.level is not None:
-            level = self.level
-            numbers = {"mean": level.mean.tolist(), "spread": level.spread.tolist()}
-            plain["level"] = {"names": list(level.names), **numbers, "solve": dict(level.solve)}
+            plain["level"] = self.level.plain()
+        if self.rest is not None:
+            plain["rest"] = self.rest.plain()
         return plain
 
     def save(self, path: str | PathLike[str]) -> Path:
@@ -278,7 +237,13 @@ class Signer:
             return cls(name or "", bases=SignerBases.read(file))
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
-            signer = cls(str(content["name"]), _bases(content.get("bases"), file), _level(content.get("level")))
+            level, rest = content.get("level"), content.get("rest")
+            signer = cls(
+                str(content["name"]),
+                _bases(content.get("bases"), file),
+                None if level is None else SignerLevel.from_plain(level),
+                None if rest is None else SignerRest.from_plain(rest),
+            )
         except FileNotFoundError:
             raise SignfaceError("no such file", file=file) from None
         except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
@@ -291,13 +256,3 @@ def _bases(rows: Any, file: Path) -> SignerBases | None:
         return None
     displacements = np.array([row[2:] for row in rows], dtype=np.float64).reshape(len(rows), 3)
     return SignerBases(tuple(str(r[0]) for r in rows), tuple(str(r[1]) for r in rows), displacements, source=str(file))
-
-
-def _level(content: Mapping[str, Any] | None) -> SignerLevel | None:
-    if content is None:
-        return None
-    names = tuple(str(name) for name in content["names"])
-    mean, spread = (np.array(content[key], dtype=np.float64) for key in ("mean", "spread"))
-    if mean.shape != (len(names),) or spread.shape != mean.shape or not np.isfinite([mean, spread]).all():
-        raise ValueError("the level does not match its names")
-    return SignerLevel(names, mean, spread, dict(content.get("solve") or {}))

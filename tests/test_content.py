@@ -18,7 +18,8 @@ from signface.face.mesh import Mesh
 from signface.face.model import FaceModel
 from signface.segmentation.energy import energies
 from signface.segmentation.segments import Segments
-from signface.signer import Signer, SignerBases, SignerLevel
+from signface.signer import Signer, SignerBases
+from signface.signer_level import SignerLevel
 from signface.takes.take import Take
 
 WEIGHTS = np.array([[0.0, np.nan], [0.5, 1.0], [0.2, 0.3], [0.1, 0.4]])

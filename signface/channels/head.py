@@ -1,6 +1,5 @@
 """What the head does: nods and shakes with their cycles and amplitude, tilts and turns held.
 
-- `head_angles`: pitch, yaw and roll of the head in degrees.
 - `swings`: the turning points of an angle.
 - `head_events`: events of the head channel.
 """
@@ -16,28 +15,10 @@ import pandas as pd
 
 from signface.descriptors import Descriptors
 from signface.frames import hysteresis, long_enough, runs
+from signface.head import head_angles
 
 #: Window over which angles are smoothed before their turning points are sought (s).
 SMOOTHING_S = 0.1
-
-
-def head_angles(descriptors: Descriptors) -> dict[str, np.ndarray]:
-    """Angles of the head from its neutral pose, degrees, each (F,).
-
-    The face looks along +z with y up, so the signer's left is +x. `yaw` is positive to the signer's left, `pitch`
-    positive downwards (a nod), `roll` positive when the head is tilted to the signer's right shoulder. They are the
-    intrinsic rotations about y, then x, then z; NaN where the pose is unknown.
-    """
-    assert descriptors.head is not None
-    rotation = descriptors.head[:, :3, :3]
-    known = np.isfinite(rotation).all(axis=(1, 2))
-    angles = np.full((3, descriptors.n_frames), np.nan)
-    if known.any():
-        from scipy.spatial.transform import Rotation
-
-        angles[:, known] = Rotation.from_matrix(rotation[known]).as_euler("YXZ", degrees=True).T
-    yaw, pitch, roll = angles
-    return {"pitch": pitch, "yaw": yaw, "roll": roll}
 
 
 def head_events(descriptors: Descriptors, rules: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame | None:

@@ -23,12 +23,18 @@ from signface.channels.head import head_events
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.files import shipped
-from signface.frames import bridge, hysteresis, long_enough, stretches
+from signface.frames import Means, bridge, hysteresis, long_enough, stretches
+from signface.head import head_angles
 from signface.segmentation.segments import Segments
+from signface.signer_level import SignerLevel, signer_range
 
 #: Keys that a channel's table holds besides its values.
 CHANNEL_KEYS = {"description", "together", "measured_only"}
-VALUE_KEYS = {"description", "bases", "minus", "combine", "on", "off", "min_ms", "max_ms", "gap_ms"}
+VALUE_KEYS = {"description", "bases", "minus", "combine", "on", "off", "min_ms", "max_ms", "gap_ms", "signer"}
+#: Keys of a value's table `signer`, which holds where the level of the signer is known.
+SIGNER_KEYS = {"minus", "on", "off", "min_ms", "max_ms", "gap_ms", "per_pitch_deg", "take", "smooth_ms"}
+#: A signer's range is taken as at least this wide (half of it, weights), so that rest is not blown up to expression.
+LEAST_RANGE = 0.05
 
 
 def read_channels(name: str | PathLike[str] = "default") -> dict[str, dict[str, Any]]:
@@ -65,12 +71,19 @@ def _check_rule(name: str, rule: object, file: Path) -> None:
     if unknown or missing:
         problem = f"the unknown key {unknown[0]}" if unknown else f"no {missing[0]}"
         raise SignfaceError(f"[{name}] has {problem}", file=file, hint=f"the keys are {', '.join(sorted(VALUE_KEYS))}")
-    if rule["off"] > rule["on"]:
+    signer = rule.get("signer", {})
+    if not isinstance(signer, dict) or set(signer) - SIGNER_KEYS or not {"on", "off"} <= set(signer or {"on", "off"}):
+        hint = f"its keys are {', '.join(sorted(SIGNER_KEYS))}; on and off are needed"
+        raise SignfaceError(f"[{name}.signer] is no table of thresholds of a signer", file=file, hint=hint)
+    if rule["off"] > rule["on"] or signer.get("off", 0) > signer.get("on", 0):
         raise SignfaceError(f"[{name}] off is above on", file=file, hint="a value ends lower than it begins")
 
 
 def find_channels(
-    descriptors: Descriptors, channels: Mapping[str, Mapping[str, Any]] | None = None
+    descriptors: Descriptors,
+    channels: Mapping[str, Mapping[str, Any]] | None = None,
+    *,
+    level: SignerLevel | None = None,
 ) -> list[ChannelEvents]:
     """Events of every channel.
 
@@ -82,6 +95,9 @@ def find_channels(
     descriptors : Descriptors
     channels : mapping, optional
         What `read_channels` returns; the shipped thresholds when not given.
+    level : SignerLevel, optional
+        Of the signer over all their takes. Values with thresholds of their own for it are found by the signer's range
+        (`signer_signal`), the others, and all without it, by the weights as they are.
     """
     rules = read_channels() if channels is None else channels
     solved = np.isfinite(descriptors.residual if descriptors.residual is not None else np.nan).any()
@@ -94,15 +110,20 @@ def find_channels(
             if events is None:
                 continue
         else:
-            signals = {
-                value: signal
-                for value, rule in _values(table)
-                if (signal := weight_signal(descriptors, rule)) is not None
-            }
+            used = dict(_values(table))
+            signals = {}
+            for value, rule in _values(table):
+                signal = weight_signal(descriptors, rule)
+                if signal is None:
+                    continue
+                signals[value] = signal
+                if level is not None and "signer" in rule and level.sample is not None:
+                    signals[value] = signer_signal(descriptors, rule, level)
+                    used[value] = {**rule, **rule["signer"]}
             if not signals:
                 continue
             together = [tuple(pair) for pair in table.get("together", [])]
-            events = _weight_events(descriptors, signals, dict(_values(table)), together)
+            events = _weight_events(descriptors, signals, used, together)
         channel_events.append(_as_events(channel, table, events))
     return channel_events
 
@@ -153,6 +174,44 @@ def weight_signal(descriptors: Descriptors, rule: Mapping[str, Any]) -> np.ndarr
     signal = np.max(bases, axis=0) if rule.get("combine") == "max" else np.mean(bases, axis=0)
     minus = [descriptors.weight(base) for base in rule.get("minus", []) if base in descriptors.names]
     return signal - np.mean(minus, axis=0) if minus else signal
+
+
+def signer_signal(descriptors: Descriptors, rule: Mapping[str, Any], level: SignerLevel) -> np.ndarray:
+    """(F,) signal of a value in units of the signer: 0 where they rest, 2 at the upper end of their range.
+
+    The signal of `weight_signal` with `per_pitch_deg` times the head's pitch added (what a monocular tracker takes for
+    a movement of the face when the head nods), less the low end of the signer's range and over half of that range
+    (`signface.signer_level.signer_range`), smoothed over `smooth_ms`, less `take` times the take's own tenth
+    percentile: a little of what a take never leaves is the camera's or the mood's.
+
+    Parameters
+    ----------
+    descriptors : Descriptors
+    rule : mapping
+        With a table `signer`.
+    level : SignerLevel
+        With a sample.
+    """
+    own, frames = rule["signer"], level.frames
+    assert frames is not None
+    values = []
+    for take in (descriptors, frames):
+        signal = weight_signal(take, {**rule, **own})
+        assert signal is not None
+        slope = own.get("per_pitch_deg", 0.0)
+        values.append(signal + slope * head_angles(take)["pitch"] if slope else signal)
+    low, half = signer_range(values[1])
+    signal = (values[0] - low) / max(float(half), LEAST_RANGE)
+    known = np.isfinite(signal)
+    if not known.any():
+        return signal
+    half_s = own.get("smooth_ms", 0) / 2000
+    if half_s:
+        time = (np.arange(len(signal)) + 0.5) / descriptors.rate
+        whole = np.interp(time, time[known], signal[known])[:, None]
+        mean = Means(whole, descriptors.rate).between(time - half_s, time + half_s)[:, 0]
+        signal = np.where(known, mean, np.nan)
+    return signal - own.get("take", 0.0) * np.percentile(signal[known], 10)
 
 
 def _weight_events(

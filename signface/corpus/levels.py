@@ -1,13 +1,15 @@
 """Where the faces of a corpus's signers rest, from all of their takes.
 
-- `learn_signers`: each signer with the level of all takes, for whoever annotates one take of theirs.
+- `learn_signers`: each signer with the rest and level of all takes, for whoever annotates one take of theirs.
 """
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 
-from signface.corpus.describing import recipe_of, stored_or_solved
+from signface.corpus.describing import describe_entry, layout_for, read_entry, recipe_of, stored_or_solved
 from signface.corpus.manifest import Corpus, TakeEntry
 from signface.corpus.origin import Recipe, find_origin, make_recipe
 from signface.corpus.signers import find_signer
@@ -16,6 +18,9 @@ from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.settings.solve import SolveSettings
 from signface.signer import Signer
+from signface.signer_level import SignerRest
+from signface.solver.signer_rest import signer_rest
+from signface.takes.take import Take
 
 
 def learn_signers(
@@ -24,7 +29,9 @@ def learn_signers(
     *,
     progress: Callable[[Iterable[TakeEntry]], Iterable[TakeEntry]] = iter,
 ) -> Iterator[Signer]:
-    """Each signer of a corpus with the level of all of their takes; bases stay those of the folder `signers`.
+    """Each signer of a corpus with the rest and level of all of their takes; bases stay those of the folder `signers`.
+
+    Landmarks have a rest. Markers, which are glued on anew each time, and weights have a level only.
 
     No annotation is looked at. What the store of the corpus has is taken from there, the rest is solved and put there.
 
@@ -54,15 +61,40 @@ def learn_signers(
     """
     store, recipe = open_store(corpus.folder), make_recipe(settings)
     known: dict[tuple[str, str | None], Recipe] = {}
-    by_signer: dict[str, list[Descriptors]] = {name: [] for name in corpus.signers}
     errors: dict[str, SignfaceError] = {}
-    for entry in progress(corpus):
+    by_signer: dict[str, list[Descriptors]] = {}
+    signers: dict[str, Signer] = {}
+    for entry in progress(sorted(corpus, key=lambda entry: entry.signer)):
+        name = entry.signer
+        if name not in signers:
+            mine = [other for other in corpus if other.signer == name]
+            signers[name] = replace(find_signer(corpus.folder, name), rest=_rest(mine, recipe, known))
+            by_signer[name] = []
         try:
-            origin = find_origin(entry, corpus.folder, recipe_of(entry, recipe, known))
-            by_signer[entry.signer].append(stored_or_solved(entry, origin, store, corpus.folder)[0])
+            of_entry = recipe_of(entry, recipe, known)
+            if signers[name].rest is None:
+                origin = find_origin(entry, corpus.folder, of_entry)
+                by_signer[name].append(stored_or_solved(entry, origin, store, corpus.folder)[0])
+            else:  # the store knows takes by the rest that the corpus has on disk, which is not this one yet
+                by_signer[name].append(describe_entry(entry, of_entry, signers[name]))
         except SignfaceError as error:
-            errors[entry.signer] = error
-    for name, takes in by_signer.items():
-        if not takes:
+            errors[name] = error
+    for name in corpus.signers:
+        if not by_signer[name]:
             raise errors[name]
-        yield find_signer(corpus.folder, name).with_level(takes)
+        yield signers[name].with_level(by_signer[name])
+
+
+def _rest(entries: list[TakeEntry], recipe: Recipe, known: dict[tuple[str, str | None], Recipe]) -> SignerRest | None:
+    """The rest of a signer whose takes are of landmarks; None where they are of markers or hold weights."""
+    recordings: list[Take] = []
+    layout = None
+    for entry in entries:
+        with contextlib.suppress(SignfaceError):  # said when it is solved
+            recording = read_entry(entry)
+            if isinstance(recording, Take):
+                found = layout_for(recipe_of(entry, recipe, known), recording.labels)
+                if found.of_landmarks:
+                    recordings.append(recording)
+                    layout = found
+    return None if layout is None else signer_rest(recordings, layout)

@@ -165,7 +165,7 @@ def find_origin(entry: TakeEntry, folder: Path, recipe: Recipe) -> Origin:
         neutral_s=None if holds_weights else entry.neutral_s,
         start_s=entry.start_s,
         recipe=weights_recipe() if holds_weights else recipe,
-        bases="" if holds_weights else find_signer(folder, entry.signer).bases_digest,
+        bases="" if holds_weights else find_signer(folder, entry.signer).solving_digest,
     )
 
 

@@ -34,7 +34,7 @@ from signface.segmentation.cutting import segment
 from signface.segmentation.segments import Segments, value_at
 from signface.settings.choices import NAMES
 from signface.settings.training import TrainingSettings
-from signface.signer import SignerLevel
+from signface.signer_level import SignerLevel
 
 #: name: which takes train the classifier that a signer's test takes are given to.
 PROTOCOLS = {

@@ -13,6 +13,10 @@ from signface.face.model import FaceModel
 
 ROLES = ("face", "head")
 
+#: Layouts of landmarks that a tracker finds in pictures. Unlike markers, they are on the same places of a signer's face
+#: in every take, and do not creep on the skin.
+LANDMARK_LAYOUTS = ("mediapipe", "openface", "kinect")
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MarkerLayout(Summary, Content):
@@ -85,6 +89,11 @@ class MarkerLayout(Summary, Content):
 
     def _of(self, role: str) -> tuple[str, ...]:
         return tuple(label for label, kind in zip(self.labels, self.roles) if kind == role)
+
+    @property
+    def of_landmarks(self) -> bool:
+        """Whether a tracker finds its markers in pictures; see `LANDMARK_LAYOUTS`."""
+        return self.name in LANDMARK_LAYOUTS
 
     @property
     def face_labels(self) -> tuple[str, ...]:

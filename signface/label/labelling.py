@@ -22,7 +22,7 @@ from signface.label.spans import frames_within, segment_means
 from signface.label.vocabulary import Vocabulary
 from signface.segmentation.cutting import segment
 from signface.segmentation.segments import Segments
-from signface.signer import SignerLevel
+from signface.signer_level import SignerLevel
 
 #: Frames per second that the confidence of a segment is averaged over.
 CONFIDENCE_RATE = 25.0

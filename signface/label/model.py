@@ -16,7 +16,7 @@ from signface.label.calibration import calibrated
 from signface.label.variants import DescriptorVariant
 from signface.label.vocabulary import AFFECT, Vocabulary
 from signface.settings.choices import SEQUENCE_NAMES
-from signface.signer import SignerLevel
+from signface.signer_level import SignerLevel
 
 if TYPE_CHECKING:
     from sklearn.base import ClassifierMixin

@@ -16,7 +16,7 @@ from signface.errors import SignfaceError
 from signface.frames import Means
 from signface.segmentation.energy import bridged
 from signface.settings.choices import FEATURES, NORMALISATIONS
-from signface.signer import SignerLevel, signer_level
+from signface.signer_level import SignerLevel, signer_level
 
 #: Width of the windows, seconds.
 WINDOW_S = 1.0

@@ -23,7 +23,7 @@ from signface.errors import SignfaceError
 from signface.label.variants import DescriptorVariant
 from signface.label.vocabulary import AFFECT, Vocabulary
 from signface.segmentation.segments import Segments
-from signface.signer import SignerLevel, signer_level
+from signface.signer_level import SignerLevel, signer_level
 
 #: Frames per second kept for training: a held face hardly changes in a tenth of a second.
 TRAINING_RATE = 10.0

@@ -37,6 +37,8 @@ class Displacements(Stage):
         See `signface.solver.adaptation.make_adaptation`.
     neutral_s : float
         Time of the neutral frame in seconds.
+    rest : (P, 3) array, optional
+        In its place: where the markers are on the signer's resting face, as the recording is aligned.
 
     Attributes
     ----------
@@ -50,15 +52,24 @@ class Displacements(Stage):
     """
 
     def __init__(
-        self, labels: Sequence[str], face: FaceModel, layout: MarkerLayout, *, kind: str, neutral_s: float
+        self,
+        labels: Sequence[str],
+        face: FaceModel,
+        layout: MarkerLayout,
+        *,
+        kind: str,
+        neutral_s: float,
+        rest: np.ndarray | None = None,
     ) -> None:
         self._labels, self._face, self._layout = tuple(labels), face, layout
-        self._kind, self._neutral_s = kind, neutral_s
+        self._kind, self._neutral_s, self._rest_places = kind, neutral_s, rest
 
     def learn(self, view: View) -> None:
         """The adaptation, from the neutral places of the markers."""
         self._columns = columns_of(view.recording, self._labels)
-        _, places = neutral_places(view.recording, self._labels, self._neutral_s)
+        places = self._rest_places
+        if places is None:
+            _, places = neutral_places(view.recording, self._labels, self._neutral_s)
         self.adaptation = make_adaptation(self._kind, places, self._layout.points(self._face, self._labels))
         # Against the adapted neutral, not the avatar's: where the map passes by the markers, rest must still be rest.
         self._rest = self.adaptation.transform(places)

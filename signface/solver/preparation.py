@@ -18,6 +18,7 @@ from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.settings.solve import SolveSettings
 from signface.signer import Signer
+from signface.signer_level import SignerRest
 from signface.solver.adaptation import MorphologicalAdaptation, SimilarityAdaptation
 from signface.solver.base import Solution
 from signface.solver.creep import Creep
@@ -25,8 +26,10 @@ from signface.solver.displacements import Displacements, neutral_places
 from signface.solver.resting import resting_time
 from signface.takes.cleaning import Kept, Progress, cleaning_stages, silently
 from signface.takes.recording import PIECE, Recording
-from signface.takes.stabilisation import HeadMotion, NeutralAlignment
+from signface.takes.rigid import apply
+from signface.takes.stabilisation import HeadMotion, NeutralAlignment, rigid_transform
 from signface.takes.stages import Block, Stage, View, block_of
+from signface.takes.take import Take
 
 #: The neutral frame is looked for among all frames of takes up to this length (five minutes at 200 Hz), and among so
 #: many evenly spaced ones of longer takes.
@@ -59,7 +62,7 @@ class Preparation:
     adaptation : SimilarityAdaptation or MorphologicalAdaptation
         From the signer's face, in its neutral pose, to the avatar's.
     neutral_s : float
-        Time of the neutral frame.
+        Time of the neutral frame; NaN where the signer's rest stands for it.
     signer_bases : (N, P, 3) array or None
         The signer's bases at the layout's markers; None where the avatar's serve.
     note : str
@@ -93,37 +96,74 @@ class Preparation:
                 file=clean.name,
                 hint="use a layout with more of its face markers",
             )
+        rest = None if signer is None or settings.neutral != "auto" else signer.rest
         if settings.neutral != "auto":
             clean.frame_at(float(settings.neutral))
         glance = clean.glance(VIEW_FRAMES, piece=piece, progress=progress)
-        if settings.neutral == "auto":
-            time, how = resting_time(glance, face, layout, adaptation=settings.adaptation), "found"
-        else:
-            time, how = float(settings.neutral), "given"
+        time, seen, places = self._neutral(glance, face, layout, labels, settings, rest)
         self.neutral_s = time
-        seen, _ = neutral_places(clean, labels, time)
-        if len(seen) < 4:
-            raise SignfaceError(
-                f"only {len(seen)} face markers are seen at the neutral time {time:.3f} s",
-                file=clean.name,
-                hint="give another neutral time: --neutral SECONDS",
-            )
         self.layout = layout.restricted([*seen, *head])
         bases = None if signer is None else signer.bases
         self.signer_bases = None if bases is None else bases.at(face, self.layout)
         view = View(clean, Block(glance.positions, range(clean.n_frames)[:: round(clean.rate / glance.rate)]))
-        alignment = NeutralAlignment(seen, layout.points(face, seen), time)
-        motion = HeadMotion(head, neutral_s=time, fallback=settings.head_fallback)
+        target = layout.points(face, seen)
+        aligned = known = None
+        if rest is not None:
+            onto = rigid_transform(places, target)[None]
+            known = dict(zip(rest.labels, apply(onto, rest.places[None])[0], strict=True))
+            aligned = np.array([known[label] for label in seen])
+        alignment = NeutralAlignment(seen, target, time, rest=None if rest is None else places)
+        motion = HeadMotion(head, neutral_s=time, fallback=settings.head_fallback, rest=known)
         still = view.through(alignment, motion)
-        displacements = Displacements(seen, face, layout, kind=settings.adaptation, neutral_s=time)
-        creep = [Creep(face, self.layout, signer_bases=self.signer_bases)] if settings.takes_creep_away else []
+        displacements = Displacements(seen, face, layout, kind=settings.adaptation, neutral_s=time, rest=aligned)
+        creep: list[Stage] = []
+        # Landmarks do not creep on the skin. What stays the same through a short take of them is what the face does.
+        if settings.takes_creep_away and not layout.of_landmarks:
+            creep = [Creep(face, self.layout, signer_bases=self.signer_bases)]
         self._still = still.recording
         self._prepared = still.through(displacements, *creep).recording
         self.stages = (*cleaning, alignment, motion, displacements, *creep)
         self.adaptation = displacements.adaptation
-        notes = [f"neutral frame {how} at {time:.3f} s", displacements.note]
+        how = "found" if settings.neutral == "auto" else "given"
+        notes = [
+            f"neutral frame {how} at {time:.3f} s" if rest is None else f"rest of the signer over {rest.takes} takes"
+        ]
+        notes += [displacements.note]
         notes += [] if bases is None else [f"bases of the signer in {Path(bases.source).name}"]
         self.note = "; ".join([*notes, *(stage.note for stage in creep)])
+
+    def _neutral(
+        self,
+        glance: Take,
+        face: FaceModel,
+        layout: MarkerLayout,
+        labels: list[str],
+        settings: SolveSettings,
+        rest: SignerRest | None,
+    ) -> tuple[float, tuple[str, ...], np.ndarray]:
+        """Time of the neutral frame, and which markers are where in it; the signer's rest, where that is known."""
+        if rest is not None:
+            shown = np.isfinite(glance.positions[..., 0]).any(axis=0)
+            seen, places = rest.of([label for label in labels if shown[glance.labels.index(label)]])
+            if len(seen) < 4:
+                raise SignfaceError(
+                    f"the signer's rest knows {len(seen)} of the face markers of the layout {layout.name}",
+                    file=glance.name,
+                    hint="learn the signer anew from takes with these markers: signface corpus signers",
+                )
+            return float("nan"), seen, places
+        if settings.neutral == "auto":
+            time = resting_time(glance, face, layout, adaptation=settings.adaptation)
+        else:
+            time = float(settings.neutral)
+        seen, places = neutral_places(self.recording, labels, time)
+        if len(seen) < 4:
+            raise SignfaceError(
+                f"only {len(seen)} face markers are seen at the neutral time {time:.3f} s",
+                file=glance.name,
+                hint="give another neutral time: --neutral SECONDS",
+            )
+        return time, seen, places
 
     def frames(self, begin: int, end: int) -> tuple[np.ndarray, np.ndarray]:
         """Frames of the recording, ready to be solved.

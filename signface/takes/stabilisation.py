@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -112,16 +112,22 @@ def align_neutral(take: Take, labels: Sequence[str], points: np.ndarray, neutral
 
 
 class NeutralAlignment(Stage):
-    """The recording moved rigidly as a whole onto the avatar; see `align_neutral`, whose parameters it has."""
+    """The recording moved rigidly as a whole onto the avatar; see `align_neutral`, whose parameters it has.
 
-    def __init__(self, labels: Sequence[str], points: np.ndarray, neutral_s: float) -> None:
-        self._labels, self._points, self._neutral_s = list(labels), points, neutral_s
+    With `rest`, (M, 3) places of the markers on the signer's resting face, these stand for the neutral frame.
+    """
+
+    def __init__(
+        self, labels: Sequence[str], points: np.ndarray, neutral_s: float, *, rest: np.ndarray | None = None
+    ) -> None:
+        self._labels, self._points, self._neutral_s, self._rest = list(labels), points, neutral_s, rest
 
     def learn(self, view: View) -> None:
         """The rigid motion, from the neutral frame."""
-        recording = view.recording
-        frame = recording.frame_at(self._neutral_s)
-        neutral = recording.frames(frame, frame + 1)[0, columns_of(recording, self._labels)]
+        recording, neutral = view.recording, self._rest
+        if neutral is None:
+            frame = recording.frame_at(self._neutral_s)
+            neutral = recording.frames(frame, frame + 1)[0, columns_of(recording, self._labels)]
         try:
             self._pose = rigid_transform(neutral, self._points)
         except SignfaceError as error:
@@ -138,7 +144,8 @@ class NeutralAlignment(Stage):
     @property
     def note(self) -> str:
         """By how many markers, and when."""
-        return f"align_neutral {len(self._labels)} markers at {self._neutral_s:.3f} s"
+        when = f"at {self._neutral_s:.3f} s" if self._rest is None else "of the signer's rest"
+        return f"align_neutral {len(self._labels)} markers {when}"
 
 
 def _unweighted(head: np.ndarray, neutral: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -241,7 +248,8 @@ def least_moving(labels: Sequence[str], neutral: np.ndarray, sample: np.ndarray,
 class HeadMotion(Stage):
     """The motion of the head taken away; see `stabilise`, whose parameters and errors it has.
 
-    Blocks get the head's poses. Frames that stand alone get none from their neighbours.
+    Blocks get the head's poses. Frames that stand alone get none from their neighbours. With `rest`, places of markers
+    on the signer's resting face by label, these stand for the neutral frame.
 
     Attributes
     ----------
@@ -249,16 +257,26 @@ class HeadMotion(Stage):
         The markers that carry the head, once it has learnt.
     """
 
-    def __init__(self, head: Sequence[str], *, neutral_s: float, fallback: str | None = None) -> None:
+    def __init__(
+        self,
+        head: Sequence[str],
+        *,
+        neutral_s: float,
+        fallback: str | None = None,
+        rest: Mapping[str, np.ndarray] | None = None,
+    ) -> None:
         if fallback not in (None, "least-moving"):
             raise SignfaceError(f"no fallback named {fallback}", hint="the fallback is least-moving")
-        self._head, self._neutral_s, self._fallback = list(head), neutral_s, fallback
+        self._head, self._neutral_s, self._fallback, self._rest = list(head), neutral_s, fallback, rest
 
     def learn(self, view: View) -> None:
         """Which markers carry the head, where they are in the neutral frame, and how well they keep their places."""
         recording = view.recording
-        frame = recording.frame_at(self._neutral_s)
-        neutral = recording.frames(frame, frame + 1)[0]
+        if self._rest is None:
+            frame = recording.frame_at(self._neutral_s)
+            neutral = recording.frames(frame, frame + 1)[0]
+        else:
+            neutral = np.array([self._rest.get(label, np.full(3, np.nan)) for label in recording.labels])
         sample = view.spread(SAMPLE_FRAMES).positions
         column = {label: index for index, label in enumerate(recording.labels)}
         carriers = [label for label in self._head if label in column and np.isfinite(neutral[column[label], 0])]

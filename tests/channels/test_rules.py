@@ -9,10 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from signface.channels.head import head_angles, swings
+from signface.channels.head import swings
 from signface.channels.rules import bridge, find_channels, find_intensities, hysteresis, long_enough, read_channels
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
+from signface.head import head_angles
 from signface.segmentation.segments import Segments
 
 BASES = (

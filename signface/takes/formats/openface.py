@@ -1,9 +1,9 @@
 """OpenFace tables: 68 landmarks of one camera as markers, or the action units as weights.
 
 OpenFace 2.x writes a row a frame and face: `frame, face_id, timestamp, confidence, success, pose_Tx, ..., x_0, ...,
-X_0, ..., AU01_r, ...`, with or without blanks after the commas, and any subset of the columns. `X, Y, Z` are millimetres
-from the camera, x to the right of the picture, y down, z away; they become x to the signer's left, y up, z towards the
-camera.
+X_0, ..., AU01_r, ...`, with or without blanks after the commas, and any subset of the columns. `X, Y, Z` are
+millimetres from the camera, x to the right of the picture, y down, z away; they become x to the signer's left, y up,
+z towards the camera.
 
 - `read_openface`: the landmarks.
 - `read_action_units`: the action units, and the head's pose.
