@@ -22,6 +22,7 @@ from signface.cli.options import (
 from signface.cli.threads import one_thread_for_matrices
 from signface.errors import SignfaceError
 from signface.progress import progress
+from signface.settings.choices import BY_SIGNER
 from signface.settings.eaf import EafOptions
 from signface.settings.solve import SolveSettings
 
@@ -95,7 +96,7 @@ def run(arguments: argparse.Namespace) -> int:
         model = beside.submit(_load_model, arguments.classifier)
         face, layout = read_face_and_layout(settings)
         known: dict[Path, Descriptors] = {}
-        if len(takes) > 1 and signer.level is None and model.result().card.normalise == "signer":
+        if len(takes) > 1 and signer.level is None and model.result().card.normalise in BY_SIGNER:
             for take in progress(takes, "solving"):
                 with contextlib.suppress(SignfaceError):  # said when its turn comes
                     known[take] = solve(open_recording(take), face, layout, settings=settings, signer=signer)

@@ -30,6 +30,7 @@ from signface.corpus.signers import find_signer
 from signface.corpus.store import DescriptorStore
 from signface.elan.mapping import read_mapping
 from signface.errors import SignfaceError
+from signface.settings.choices import BY_SIGNER
 from signface.settings.eaf import EafOptions
 from signface.settings.solve import SolveSettings
 from signface.signer import Signer
@@ -102,7 +103,7 @@ def run_corpus(
 
         from signface.label.persistence import read_card
 
-        if read_card(classifier).normalise == "signer":
+        if read_card(classifier).normalise in BY_SIGNER:
             for _ in everywhere(solve_job):  # what fails says so when it is annotated
                 pass
             jobs = _with_levels(jobs, store)

@@ -17,6 +17,7 @@ from signface.label.model import TrainedModel
 from signface.label.spans import segment_means
 from signface.learn.examples import signer_levels
 from signface.metrics.classification import accuracy_interval
+from signface.settings.choices import BY_SIGNER
 
 if TYPE_CHECKING:
     from signface.evaluation.protocol import Fold
@@ -121,7 +122,7 @@ def permutation_importance(
 
 def _segments_of(fold: Fold, model: TrainedModel) -> tuple[np.ndarray, tuple[str, ...], np.ndarray, np.ndarray]:
     """Mean descriptors, names of their columns, label and take of the reference's stable segments of the test takes."""
-    levels = signer_levels(fold.test) if model.card.normalise == "signer" else {}
+    levels = signer_levels(fold.test) if model.card.normalise in BY_SIGNER else {}
     means, truth, take = [], [], []
     names: tuple[str, ...] = ()
     for example in fold.test:

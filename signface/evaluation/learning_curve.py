@@ -24,6 +24,7 @@ from signface.label.spans import segment_means
 from signface.learn.examples import Example, in_order, signer_levels
 from signface.learn.training import train
 from signface.segmentation.segments import Segments
+from signface.settings.choices import BY_SIGNER
 from signface.settings.training import TrainingSettings
 
 #: Training takes that one classifier may be trained on in all, over the whole curve: what bounds its time.
@@ -160,7 +161,7 @@ def _plan(folds: Sequence[Fold], by: str, sizes: list[int], draws: int, most_tak
 
 def _hits(fold: Fold, model: TrainedModel) -> int:
     """How many stable segments of the reference of the test takes get their label."""
-    levels = signer_levels(fold.test) if model.card.normalise == "signer" else {}
+    levels = signer_levels(fold.test) if model.card.normalise in BY_SIGNER else {}
     right, means, truths = 0, [], []
     for example in fold.test:
         level = levels.get(example.signer)

@@ -32,7 +32,7 @@ from signface.metrics.classification import accuracy_interval, classification_me
 from signface.metrics.segmentation import segmentation_metrics
 from signface.segmentation.cutting import segment
 from signface.segmentation.segments import Segments, value_at
-from signface.settings.choices import NAMES
+from signface.settings.choices import BY_SIGNER, NAMES
 from signface.settings.training import TrainingSettings
 from signface.signer_level import SignerLevel
 
@@ -230,7 +230,7 @@ def evaluate_folds(
     own: dict[str, list[tuple[pd.DataFrame, pd.DataFrame]]] = {name: [] for name in classifiers}
     annotated: dict[str, dict[str, Segments]] = {name: {} for name in classifiers}
     trained: list[dict[str, dict]] = [{} for _ in folds]
-    levels = [signer_levels(fold.test) if settings.normalise == "signer" else {} for fold in folds]
+    levels = [signer_levels(fold.test) if settings.normalise in BY_SIGNER else {} for fold in folds]
     strengths: list[pd.DataFrame] = []
     steps = [(number, name) for number in range(len(folds)) for name in classifiers]
     for number, name in progress(steps):
@@ -289,7 +289,7 @@ def score_model(model: TrainedModel, test: Sequence[Example], *, seed: int = 0) 
     """
     parts: dict[str, list[pd.DataFrame]] = {}
     pairs, strengths = [], []
-    levels = signer_levels(test) if model.card.normalise == "signer" else {}
+    levels = signer_levels(test) if model.card.normalise in BY_SIGNER else {}
     for example in test:
         level = levels.get(example.signer)
         cut = partial(find_segments, model=model, level=level) if model.sequential else segment

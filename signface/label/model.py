@@ -15,7 +15,7 @@ from signface.errors import SignfaceError, SignfaceWarning
 from signface.label.calibration import calibrated
 from signface.label.variants import DescriptorVariant
 from signface.label.vocabulary import AFFECT, Vocabulary
-from signface.settings.choices import SEQUENCE_NAMES
+from signface.settings.choices import BY_SIGNER, SEQUENCE_NAMES
 from signface.signer_level import SignerLevel
 
 if TYPE_CHECKING:
@@ -169,7 +169,7 @@ class TrainedModel(Summary):
             As `columns`.
         """
         self.columns(descriptors)
-        normalises = self.card.normalise == "signer"
+        normalises = self.card.normalise in BY_SIGNER
         if normalises and level is None:
             warnings.warn(
                 f"{self.name} normalises signers, and of this signer only {descriptors.name} is known: "

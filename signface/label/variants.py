@@ -14,9 +14,10 @@ from sklearn.base import BaseEstimator, TransformerMixin
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.frames import Means
+from signface.head import HEAD_COLUMNS, with_head
 from signface.segmentation.energy import bridged
-from signface.settings.choices import FEATURES, NORMALISATIONS
-from signface.signer_level import SignerLevel, signer_level
+from signface.settings.choices import BY_SIGNER, FEATURES, NORMALISATIONS
+from signface.signer_level import SignerLevel, signer_level, signer_range
 
 #: Width of the windows, seconds.
 WINDOW_S = 1.0
@@ -29,6 +30,11 @@ SLOPE_S = 0.23
 LEAST_SPREAD = 0.02
 
 
+#: Half a signer's range is taken as at least this: weights, and degrees and millimetres of the head.
+LEAST_RANGE = 0.05
+LEAST_RANGES = {name: 1.0 if name in HEAD_COLUMNS[:3] else 2.0 for name in HEAD_COLUMNS}
+
+
 class DescriptorVariant(TransformerMixin, BaseEstimator):
     """Takes with the columns that a classifier is to see, as a transformer of scikit-learn.
 
@@ -38,7 +44,8 @@ class DescriptorVariant(TransformerMixin, BaseEstimator):
     Parameters
     ----------
     features : sequence of str
-        Names of `signface.settings.choices.FEATURES`, in the order of the columns.
+        Names of `signface.settings.choices.FEATURES`, in the order of the columns; `head` adds its columns to those of
+        the take, of which the others are made.
     normalise : str
         A name of `signface.settings.choices.NORMALISATIONS`.
 
@@ -78,10 +85,22 @@ class DescriptorVariant(TransformerMixin, BaseEstimator):
         """Whether it leaves takes as they are."""
         return tuple(self.features) == ("weights",) and self.normalise == "none"
 
+    @property
+    def by_signer(self) -> bool:
+        """Whether it needs the level of the signer."""
+        return self.normalise in BY_SIGNER
+
     def names(self, bases: Sequence[str]) -> tuple[str, ...]:
-        """Names of the columns for some bases."""
+        """Names of the columns for some bases; with `head`, its columns are like bases."""
+        if "head" in self.features:
+            bases = (*bases, *HEAD_COLUMNS)
         forms = {"weights": ("{}",), "derivatives": ("slope({})",), "windows": ("mean({})", "deviation({})")}
-        return tuple(form.format(base) for name in self.features for form in forms[name] for base in bases)
+        return tuple(form.format(base) for name in self._forms for form in forms[name] for base in bases)
+
+    @property
+    def _forms(self) -> tuple[str, ...]:
+        """The features that are made of columns; the columns as they are where there is only the head."""
+        return tuple(name for name in self.features if name != "head") or ("weights",)
 
     def fit(self, takes: Sequence[Descriptors], y: object = None) -> DescriptorVariant:
         """Nothing is learnt; the names are checked."""
@@ -98,33 +117,54 @@ class DescriptorVariant(TransformerMixin, BaseEstimator):
         """
         who = [""] * len(takes) if signers is None else list(signers)
         levels: dict[str, SignerLevel | None] = dict.fromkeys(who)
-        if self.normalise == "signer":
+        if self.by_signer:
             levels = {name: signer_level([t for t, w in zip(takes, who, strict=True) if w == name]) for name in levels}
         return [self.of(take, levels[name]) for take, name in zip(takes, who, strict=True)]
 
     def of(self, take: Descriptors, level: SignerLevel | None = None) -> Descriptors:
         """One take with the columns wanted; `level` is that of the take alone when not given."""
         self.check()
-        if self.normalise == "signer":
-            level = signer_level([take]) if level is None else level
+        bases = take.names
+        level = signer_level([take]) if self.by_signer and level is None else level
+        columns = with_head(take) if "head" in self.features else take
+        if level is not None and self.normalise == "range":
+            take = _in_range(columns, level)
+        elif level is not None and self.normalise == "signer":
             place = [level.names.index(name) for name in take.names]
             scaled = (take.weights - level.mean[place]) / (level.spread[place] + LEAST_SPREAD)
-            take = replace(take, weights=scaled)
-        if tuple(self.features) == ("weights",):
+            take = replace(
+                columns, weights=np.concatenate([scaled, columns.weights[:, take.weights.shape[1] :]], axis=1)
+            )
+        else:
+            take = columns
+        if self._forms == ("weights",):
             return take
         known = np.isfinite(take.weights).all(axis=1)
         smooth = bridged(take) if known.any() else take.weights
         parts: list[np.ndarray] = []
-        for name in self.features:
+        for name in self._forms:
             if name == "weights":
                 parts.append(take.weights)
             elif name == "derivatives":
                 parts.append(_slopes(smooth, take.rate))
             else:
                 parts += _window_statistics(smooth, take.rate)
-        columns = np.concatenate(parts, axis=1)
-        columns[~known] = np.nan
-        return replace(take, weights=columns, names=self.names(take.names))
+        made = np.concatenate(parts, axis=1)
+        made[~known] = np.nan
+        return replace(take, weights=made, names=self.names(bases))
+
+
+def _in_range(take: Descriptors, level: SignerLevel) -> Descriptors:
+    """The take in units of the signer: 0 at the low end of their range, 2 at the high one."""
+    frames = level.frames
+    if frames is None:
+        raise SignfaceError(
+            "the level of the signer says nothing of their range",
+            hint="it was learnt by an older signface: learn it again with signface corpus signers",
+        )
+    low, half = signer_range((with_head(frames) if HEAD_COLUMNS[0] in take.names else frames).on(take.names).weights)
+    least = [LEAST_RANGES.get(name, LEAST_RANGE) for name in take.names]
+    return replace(take, weights=(take.weights - low) / np.maximum(half, least))
 
 
 def _slopes(weights: np.ndarray, rate: float) -> np.ndarray:

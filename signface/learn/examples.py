@@ -23,6 +23,7 @@ from signface.errors import SignfaceError
 from signface.label.variants import DescriptorVariant
 from signface.label.vocabulary import AFFECT, Vocabulary
 from signface.segmentation.segments import Segments
+from signface.settings.choices import BY_SIGNER
 from signface.signer_level import SignerLevel, signer_level
 
 #: Frames per second kept for training: a held face hardly changes in a tenth of a second.
@@ -277,7 +278,7 @@ def frame_table(
         raise SignfaceError("there is no annotated take", hint="name other kinds or another signer")
     bases = common_bases(examples)
     variant = DescriptorVariant(features, normalise).check()
-    levels = signer_levels(examples) if normalise == "signer" else {}
+    levels = signer_levels(examples) if normalise in BY_SIGNER else {}
     pairs = [training_frames(e, bases, rate=rate, variant=variant, level=levels.get(e.signer)) for e in examples]
     counts = [len(labels) for _, labels in pairs]
     return FrameTable(

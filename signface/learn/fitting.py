@@ -108,8 +108,8 @@ def _fit_sequence(examples: Sequence[Example], settings: TrainingSettings, bases
             hint=f"it has {', '.join(labeller.get_params())}",
         )
     labeller.set_params(**settings.parameters)
-    levels = signer_levels(examples) if settings.normalise == "signer" else {}
-    variant = DescriptorVariant(normalise=settings.normalise)
+    variant = DescriptorVariant(settings.features, settings.normalise)
+    levels = signer_levels(examples) if variant.by_signer else {}
     takes = [variant.of(e.descriptors.on(bases), levels.get(e.signer)) for e in examples]
-    labeller.fit(takes, [e.moving for e in examples])
+    labeller.fit(takes, [e.reference if labeller.abrupt else e.moving for e in examples])
     return labeller, labeller.n_frames_

@@ -21,6 +21,7 @@ from signface.label.labelling import label_spans
 from signface.learn.examples import Example, signer_levels
 from signface.learn.fitting import fit_model
 from signface.learn.folds import groups_of, inner_folds
+from signface.settings.choices import BY_SIGNER
 from signface.settings.training import TrainingSettings
 
 #: classifier: what a search tries, parameter by parameter.
@@ -97,7 +98,7 @@ def cross_validate(pairs: Folds, settings: TrainingSettings) -> pd.DataFrame:
     tables = []
     for kept, left_out in pairs:
         model = fit_model(kept, settings)
-        levels = signer_levels(left_out) if settings.normalise == "signer" else {}
+        levels = signer_levels(left_out) if settings.normalise in BY_SIGNER else {}
         groups = groups_of(left_out, by_signer=len({e.signer for e in (*kept, *left_out)}) > 1)
         for example, group in zip(left_out, groups, strict=True):
             spans = example.stable[["start_s", "end_s"]].to_numpy(float)
@@ -117,7 +118,7 @@ def _sequence_scores(pairs: Folds, grid: Sequence[Mapping[str, Any]], settings: 
     totals = np.zeros(len(grid))
     for kept, left_out in pairs:
         model = fit_model(kept, settings)
-        levels = signer_levels(left_out) if settings.normalise == "signer" else {}
+        levels = signer_levels(left_out) if settings.normalise in BY_SIGNER else {}
         takes = [model.seen(e.descriptors, levels.get(e.signer)) for e in left_out]
         estimator: Any = model.estimator
         for number, parameters in enumerate(grid):

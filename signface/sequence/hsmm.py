@@ -33,6 +33,8 @@ def make_sequence_labeller(name: str, *, seed: int = 0) -> TakeLabeller:
     - `crf`: scores linear in what lies around a frame, learnt for whole courses (`signface.sequence.crf`).
     - `gru`: a recurrent network sees the take forwards and backwards (`signface.sequence.gru`); it trains by PyTorch,
       the extra `deep`, and annotates without it.
+    - `boosting`: gradient-boosted trees on frames in their sentence, for tiers where most is `none`
+      (`signface.sequence.boosting`).
 
     Parameters
     ----------
@@ -71,6 +73,10 @@ def make_sequence_labeller(name: str, *, seed: int = 0) -> TakeLabeller:
         from signface.sequence.gru import RecurrentLabeller
 
         return RecurrentLabeller(seed=seed)
+    if name == "boosting":
+        from signface.sequence.boosting import BoostingLabeller
+
+        return BoostingLabeller(seed=seed)
     if name == "hmm":
         from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 

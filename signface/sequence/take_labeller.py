@@ -47,6 +47,8 @@ class TakeLabeller(BaseEstimator, ABC):
     """
 
     relative: bool = False
+    #: Whether it learns segments that follow each other at once, rather than through transitions.
+    abrupt: bool = False
     classes_: np.ndarray
     bases_: tuple[str, ...]
     n_features_in_: int

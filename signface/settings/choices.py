@@ -12,10 +12,18 @@ FEATURES = {
     "weights": "the weights",
     "derivatives": "how fast each weight changes, 1/s",
     "windows": "mean and standard deviation of each weight over the second around the frame",
+    "head": "the head's angles and place beside the weights",
 }
 
 #: name: what it is.
-NORMALISATIONS = {"none": "weights as they are", "signer": "weights less the signer's mean, over their spread"}
+NORMALISATIONS = {
+    "none": "weights as they are",
+    "signer": "weights less the signer's mean, over their spread",
+    "range": "weights less the low end of the signer's range, over half of it",
+}
+
+#: Those that need the level of the signer.
+BY_SIGNER = ("signer", "range")
 
 #: How a segment gets its label. name: what it is.
 AGGREGATES = {
@@ -39,4 +47,5 @@ SEQUENCE_NAMES = {
     "hmm": "hidden Markov model with Gaussian frames",
     "crf": "linear-chain conditional random field",
     "gru": "recurrent network, decoded by a hidden semi-Markov model",
+    "boosting": "gradient-boosted trees on frames in their sentence, decoded by Viterbi's algorithm",
 }

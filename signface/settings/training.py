@@ -39,13 +39,14 @@ class TrainingSettings(Settings):
     classifier: str = option("forest", help="what to train", choices=(*NAMES, *SEQUENCE_NAMES))
     features: tuple[str, ...] = option(
         ("weights",),
-        help="what classifiers of segments see: weights, derivatives, windows, or several of them",
+        help="what classifiers see: weights, head, and for those of segments derivatives, windows, or several of them",
         kind=tuple,
         metavar="NAMES",
     )
     normalise: str = option(
         "none",
-        help="signer: weights less the signer's mean, over their spread, from all takes of the signer at hand",
+        help="signer: weights less the signer's mean, over their spread, from all takes of the signer at hand; range: "
+        "less the low end of the signer's range, over half of it",
         choices=tuple(NORMALISATIONS),
     )
     aggregate: str = option(
@@ -78,10 +79,10 @@ class TrainingSettings(Settings):
             raise SignfaceError(problem, hint=f"choose among {', '.join(FEATURES)}")
         if len(set(self.features)) < len(self.features):
             raise SignfaceError(f"features are named twice: {', '.join(self.features)}")
-        if self.classifier in SEQUENCE_NAMES and self.features != ("weights",):
+        if self.classifier in SEQUENCE_NAMES and not set(self.features) <= {"weights", "head"}:
             raise SignfaceError(
                 f"{self.classifier} makes its own features of the weights",
-                hint="leave out the features, or normalise signers",
+                hint="its features are weights, or weights,head",
             )
 
     def for_classifier(self, name: str) -> TrainingSettings:
@@ -93,4 +94,7 @@ class TrainingSettings(Settings):
         >>> sf.TrainingSettings(features=("windows",)).for_classifier("hmm").features
         ('weights',)
         """
-        return self.changed(classifier=name, features=("weights",) if name in SEQUENCE_NAMES else self.features)
+        features = self.features
+        if name in SEQUENCE_NAMES:
+            features = tuple(feature for feature in features if feature in ("weights", "head")) or ("weights",)
+        return self.changed(classifier=name, features=features)
