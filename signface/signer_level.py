@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 SAMPLE = 600
 #: The ends of a signer's range, percentiles. Not the least and the greatest, which are blinks, sneezes and lost tracks.
 RANGE = (5.0, 95.0)
+#: The ends of the middle two thirds, which are as far from the middle as a standard deviation of a Gaussian.
+MIDDLE = (16.0, 84.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,6 +161,21 @@ def signer_range(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     low, high = np.nanpercentile(values, RANGE, axis=0)
     return low, (high - low) / 2
+
+
+def signer_middle(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The median of a signal over a signer's frames, and half the span of its middle two thirds.
+
+    Parameters and shapes are those of `signer_range`.
+
+    Examples
+    --------
+    >>> middle, half = signer_middle(np.arange(101.0))
+    >>> float(middle), float(half)
+    (50.0, 34.0)
+    """
+    low, middle, high = np.nanpercentile(values, (MIDDLE[0], 50.0, MIDDLE[1]), axis=0)
+    return middle, (high - low) / 2
 
 
 def signer_level(takes: Sequence[Descriptors]) -> SignerLevel:

@@ -99,13 +99,15 @@ def run(arguments: argparse.Namespace) -> int:
         if len(takes) > 1 and signer.level is None and model.result().card.normalise in BY_SIGNER:
             for take in progress(takes, "solving"):
                 with contextlib.suppress(SignfaceError):  # said when its turn comes
-                    known[take] = solve(open_recording(take), face, layout, settings=settings, signer=signer)
+                    known[take] = solve(
+                        open_recording(take, read_as=settings.read_as), face, layout, settings=settings, signer=signer
+                    )
             signer = signer.with_level(list(known.values())) if known else signer
         for take, file in progress(list(zip(takes, files, strict=True)), "annotating"):
             path, into = (file, None) if arguments.into is None else (None, file)
             try:
                 descriptors = known.get(take) or solve(
-                    open_recording(take), face, layout, settings=settings, signer=signer
+                    open_recording(take, read_as=settings.read_as), face, layout, settings=settings, signer=signer
                 )
                 result = annotate(descriptors, model.result(), signer=signer, channels=channels)
                 from signface.elan.writing import write_eaf  # imported beside the solve, by _load_model

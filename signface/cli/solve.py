@@ -72,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
                     else None
                 )
                 for piece in solve_pieces(
-                    open_recording(take),
+                    open_recording(take, read_as=settings.read_as),
                     face,
                     layout,
                     settings=settings,

@@ -192,7 +192,7 @@ def check_take(check: TakeCheck) -> CheckedTake:
     span, digest = None, ""
     if entry.path.is_file():  # a missing one is told with the row
         try:
-            recording = read_entry(entry)
+            recording = read_entry(entry, check.recipe)
             span, digest = (recording.start, recording.start + recording.duration), content_digest(entry.path)
             if not isinstance(recording, Descriptors):
                 problems += _problems_of_markers(entry, check.recipe, recording)

@@ -42,7 +42,7 @@ def describe_entry(entry: TakeEntry, recipe: Recipe, signer: Signer | None = Non
     """
     from signface.solver.solving import solve
 
-    recording = read_entry(entry)
+    recording = read_entry(entry, recipe)
     if isinstance(recording, Descriptors):
         return recording
     settings = SolveSettings() if recipe.settings is None else recipe.settings
@@ -55,11 +55,12 @@ def describe_entry(entry: TakeEntry, recipe: Recipe, signer: Signer | None = Non
         raise error.at(entry.path) from error
 
 
-def read_entry(entry: TakeEntry) -> Take | Descriptors:
-    """The recording of a row of `takes.csv`, on the time line of its annotation."""
+def read_entry(entry: TakeEntry, recipe: Recipe | None = None) -> Take | Descriptors:
+    """The recording of a row of `takes.csv`, read as the recipe says, on the time line of its annotation."""
     from signface.takes.reading import read_recording
 
-    recording = read_recording(entry.path)
+    settings = None if recipe is None else recipe.settings
+    recording = read_recording(entry.path, read_as=None if settings is None else settings.read_as)
     if entry.start_s is None:
         return recording
     return recording.changed(f"start at {entry.start_s:g} s", start=entry.start_s)

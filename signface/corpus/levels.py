@@ -91,7 +91,7 @@ def _rest(entries: list[TakeEntry], recipe: Recipe, known: dict[tuple[str, str |
     layout = None
     for entry in entries:
         with contextlib.suppress(SignfaceError):  # said when it is solved
-            recording = read_entry(entry)
+            recording = read_entry(entry, recipe)
             if isinstance(recording, Take):
                 found = layout_for(recipe_of(entry, recipe, known), recording.labels)
                 if found.of_landmarks:

@@ -132,9 +132,9 @@ def make_recipe(settings: SolveSettings | None = None) -> Recipe:
     return Recipe(settings, face_digest, layout_digest, code_digest(*SOLVING_CODE))
 
 
-def weights_recipe() -> Recipe:
-    """The recipe of recordings that hold weights already."""
-    return Recipe(None, "", "", code_digest(*SOLVING_CODE))
+def weights_recipe(read_as: str | None = None) -> Recipe:
+    """The recipe of recordings that hold weights already, or that are read as weights."""
+    return Recipe(None if read_as is None else SolveSettings(read_as=read_as), "", "", code_digest(*SOLVING_CODE))
 
 
 def find_origin(entry: TakeEntry, folder: Path, recipe: Recipe) -> Origin:
@@ -155,7 +155,10 @@ def find_origin(entry: TakeEntry, folder: Path, recipe: Recipe) -> Origin:
     """
     from signface.takes.formats.registry import format_of
 
-    holds_weights = format_of(entry.path).holds == "weights"  # nothing to solve: neither face nor layout matter
+    read_as = None if recipe.settings is None else recipe.settings.read_as
+    holds_weights = (
+        format_of(entry.path, read_as).holds == "weights"
+    )  # nothing to solve: neither face nor layout matter
     return Origin(
         take=take_name(entry, folder),
         file=entry.path.name,
@@ -164,7 +167,7 @@ def find_origin(entry: TakeEntry, folder: Path, recipe: Recipe) -> Origin:
         recording=content_digest(entry.path),
         neutral_s=None if holds_weights else entry.neutral_s,
         start_s=entry.start_s,
-        recipe=weights_recipe() if holds_weights else recipe,
+        recipe=weights_recipe(read_as) if holds_weights else recipe,
         bases="" if holds_weights else find_signer(folder, entry.signer).solving_digest,
     )
 

@@ -74,6 +74,10 @@ def make_labeller(
         estimator = RandomForestClassifier(
             n_estimators=150, max_depth=12, min_samples_leaf=3, class_weight=weight, random_state=seed
         )
+    elif name == "extra-trees":
+        from sklearn.ensemble import ExtraTreesClassifier
+
+        estimator = ExtraTreesClassifier(n_estimators=500, class_weight=weight, random_state=seed)
     else:
         raise SignfaceError(
             f"there is no classifier named {name}", hint=f"choose one of {', '.join(NAMES | SEQUENCE_NAMES)}"

@@ -17,6 +17,7 @@ import pandas as pd
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
+from signface.label.courses import segment_courses
 from signface.label.model import TrainedModel
 from signface.label.spans import frames_within, segment_means
 from signface.label.vocabulary import Vocabulary
@@ -68,6 +69,10 @@ def _judged_by_rows(take: Descriptors, spans: np.ndarray, model: TrainedModel) -
     known = np.isfinite(means).all(axis=1)
     if not known.any():
         raise SignfaceError(f"{take.name}: no segment has weights, so none can be labelled")
+    if model.card.aggregate == "course":
+        shares = np.zeros((len(spans), len(model.card.labels)))
+        shares[known] = model.probabilities(segment_courses(take, spans[known]))
+        return shares.argmax(axis=1), shares
     thinned = [_thinned(take, start, end) for start, end in spans]
     probabilities = model.probabilities(take.weights[np.concatenate(thinned)])
     shares = np.zeros((len(spans), len(model.card.labels)))

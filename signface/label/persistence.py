@@ -20,6 +20,7 @@ from typing import Any
 
 from signface.errors import SignfaceError
 from signface.files import shipped, whole_file
+from signface.label.courses import courses_width
 from signface.label.model import Card, TrainedModel
 from signface.label.plain_archive import is_plain, plain_entries, read_plain
 from signface.label.skops_archive import read_skops, skops_entries
@@ -151,12 +152,18 @@ def load_model(name_or_path: str | PathLike[str] = "default", *, quickly: bool =
         ) from error
     if (
         classes != card.labels
-        or features != len(DescriptorVariant(card.features, card.normalise).names(card.bases))
+        or features != _width(card)
         or not (intensity is None or hasattr(intensity, "annotate"))
         or not hasattr(estimator, "annotate" if card.classifier in SEQUENCE_NAMES else "predict_proba")
     ):
         raise SignfaceError("its estimator and its card do not belong together", file=file, hint="train it again")
     return TrainedModel(estimator, card, name=file.stem, intensity=intensity)
+
+
+def _width(card: Card) -> int:
+    """How many numbers the estimator of a card is given for a frame, or for a segment."""
+    columns = len(DescriptorVariant(card.features, card.normalise).names(card.bases))
+    return courses_width(columns) if card.aggregate == "course" else columns
 
 
 def _found(name_or_path: str | PathLike[str]) -> Path:

@@ -34,6 +34,7 @@ TRUSTED = (
     "sklearn.calibration._SigmoidCalibration",
     "sklearn.discriminant_analysis.LinearDiscriminantAnalysis",
     "sklearn.ensemble._bagging.BaggingClassifier",
+    "sklearn.ensemble._forest.ExtraTreesClassifier",
     "sklearn.ensemble._forest.RandomForestClassifier",
     "sklearn.ensemble._hist_gradient_boosting.gradient_boosting.HistGradientBoostingClassifier",
     "sklearn.ensemble._hist_gradient_boosting.predictor.TreePredictor",

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from signface.frames import Means
 from signface.head import HEAD_COLUMNS, with_head
 from signface.segmentation.energy import bridged
 from signface.settings.choices import BY_SIGNER, FEATURES, NORMALISATIONS
-from signface.signer_level import SignerLevel, signer_level, signer_range
+from signface.signer_level import SignerLevel, signer_level, signer_middle, signer_range
 
 #: Width of the windows, seconds.
 WINDOW_S = 1.0
@@ -127,8 +127,8 @@ class DescriptorVariant(TransformerMixin, BaseEstimator):
         bases = take.names
         level = signer_level([take]) if self.by_signer and level is None else level
         columns = with_head(take) if "head" in self.features else take
-        if level is not None and self.normalise == "range":
-            take = _in_range(columns, level)
+        if level is not None and self.normalise in ("range", "middle"):
+            take = _scaled(columns, level, signer_range if self.normalise == "range" else signer_middle)
         elif level is not None and self.normalise == "signer":
             place = [level.names.index(name) for name in take.names]
             scaled = (take.weights - level.mean[place]) / (level.spread[place] + LEAST_SPREAD)
@@ -154,15 +154,17 @@ class DescriptorVariant(TransformerMixin, BaseEstimator):
         return replace(take, weights=made, names=self.names(bases))
 
 
-def _in_range(take: Descriptors, level: SignerLevel) -> Descriptors:
-    """The take in units of the signer: 0 at the low end of their range, 2 at the high one."""
+def _scaled(
+    take: Descriptors, level: SignerLevel, judge: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+) -> Descriptors:
+    """The take in units of the signer: less the place that `judge` finds in their frames, over the width."""
     frames = level.frames
     if frames is None:
         raise SignfaceError(
             "the level of the signer says nothing of their range",
             hint="it was learnt by an older signface: learn it again with signface corpus signers",
         )
-    low, half = signer_range((with_head(frames) if HEAD_COLUMNS[0] in take.names else frames).on(take.names).weights)
+    low, half = judge((with_head(frames) if HEAD_COLUMNS[0] in take.names else frames).on(take.names).weights)
     least = [LEAST_RANGES.get(name, LEAST_RANGE) for name in take.names]
     return replace(take, weights=(take.weights - low) / np.maximum(half, least))
 

@@ -20,6 +20,7 @@ import pandas as pd
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
+from signface.label.courses import segment_courses
 from signface.label.variants import DescriptorVariant
 from signface.label.vocabulary import AFFECT, Vocabulary
 from signface.segmentation.segments import Segments
@@ -131,6 +132,7 @@ def training_frames(
     rate: float = TRAINING_RATE,
     variant: DescriptorVariant | None = None,
     level: SignerLevel | None = None,
+    courses: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Weights and labels of evenly spaced frames of the reference's stable segments.
 
@@ -148,6 +150,8 @@ def training_frames(
     variant, level : optional
         What is made of the weights, and by which level of the signer it is normalised; the weights themselves when
         not given.
+    courses : bool
+        A row for each stable segment instead (`signface.label.courses.segment_courses`); `rate` does nothing then.
 
     Returns
     -------
@@ -155,6 +159,10 @@ def training_frames(
     """
     take = example.descriptors.on(bases)
     descriptors = take if variant is None else variant.of(take, level)
+    if courses:
+        rows = segment_courses(descriptors, example.stable[["start_s", "end_s"]].to_numpy(float))
+        whole = np.isfinite(rows).all(axis=1)
+        return rows[whole], example.stable["label"].to_numpy(str)[whole]
     known = np.isfinite(descriptors.weights).all(axis=1)
     time = descriptors.time
     frames, labels = [], []
@@ -245,6 +253,7 @@ def frame_table(
     features: Sequence[str] = ("weights",),
     normalise: str = "none",
     rate: float = TRAINING_RATE,
+    courses: bool = False,
 ) -> FrameTable:
     """Frames of the stable segments of annotated takes, for scripts with scikit-learn.
 
@@ -279,7 +288,10 @@ def frame_table(
     bases = common_bases(examples)
     variant = DescriptorVariant(features, normalise).check()
     levels = signer_levels(examples) if normalise in BY_SIGNER else {}
-    pairs = [training_frames(e, bases, rate=rate, variant=variant, level=levels.get(e.signer)) for e in examples]
+    pairs = [
+        training_frames(e, bases, rate=rate, variant=variant, level=levels.get(e.signer), courses=courses)
+        for e in examples
+    ]
     counts = [len(labels) for _, labels in pairs]
     return FrameTable(
         np.concatenate([frames for frames, _ in pairs]),

@@ -66,7 +66,11 @@ def _fit_frames(examples: Sequence[Example], settings: TrainingSettings, bases: 
         settings.classifier, seed=settings.seed, balanced=settings.balanced, parameters=settings.parameters
     )
     frames, labels, *_ = frame_table(
-        examples, features=settings.features, normalise=settings.normalise, rate=settings.rate
+        examples,
+        features=settings.features,
+        normalise=settings.normalise,
+        rate=settings.rate,
+        courses=settings.aggregate == "course",
     )
     vocabulary = examples[0].vocabulary
     taught = [label for label in vocabulary.values if label in set(labels)]
@@ -78,7 +82,9 @@ def _fit_frames(examples: Sequence[Example], settings: TrainingSettings, bases: 
     rarest = min(taught, key=lambda label: int((labels == label).sum()))
     if (labels == rarest).sum() < 3:
         raise SignfaceError(
-            f"the training takes hold less than half a second of {vocabulary.spelt(rarest)}",
+            f"the training takes hold too little of {vocabulary.spelt(rarest)}: fewer than three segments"
+            if settings.aggregate == "course"
+            else f"the training takes hold less than half a second of {vocabulary.spelt(rarest)}",
             hint="train on more takes of it, or on takes without it",
         )
     if settings.balanced and settings.classifier.startswith("knn"):
@@ -107,6 +113,8 @@ def _fit_sequence(examples: Sequence[Example], settings: TrainingSettings, bases
             f"{settings.classifier} has no parameter named {unknown[0]}",
             hint=f"it has {', '.join(labeller.get_params())}",
         )
+    if settings.balanced and "balance" in labeller.get_params():
+        labeller.set_params(balance=1.0)
     labeller.set_params(**settings.parameters)
     variant = DescriptorVariant(settings.features, settings.normalise)
     levels = signer_levels(examples) if variant.by_signer else {}

@@ -37,6 +37,8 @@ class BoostingLabeller(TakeLabeller):
         Weight of the squared values of leaves.
     columns : float
         Share of the features that a split looks at.
+    every : int
+        Train on every so many frames: neighbours are nearly equal.
     balance : float
         How far rare labels count more in training: 0 as often as they are, 1 all the same.
     stay : float
@@ -59,9 +61,10 @@ class BoostingLabeller(TakeLabeller):
         iterations: int = 150,
         rate: float = 0.05,
         leaves: int = 12,
-        smallest: int = 40,
+        smallest: int = 20,
         penalty: float = 5.0,
         columns: float = 0.2,
+        every: int = 2,
         balance: float = 0.0,
         stay: float = 0.9,
         seed: int = 0,
@@ -72,6 +75,7 @@ class BoostingLabeller(TakeLabeller):
         self.smallest = smallest
         self.penalty = penalty
         self.columns = columns
+        self.every = every
         self.balance = balance
         self.stay = stay
         self.seed = seed
@@ -102,8 +106,8 @@ class BoostingLabeller(TakeLabeller):
             times = self._frames.times(take)
             state = frame_states(reference, times)
             known = (state != "") & (state != TRANSITION)
-            states.append(state[known])
-            features.append(course_features(take.on(self.bases_), times)[known])
+            states.append(state[known][:: self.every])
+            features.append(course_features(take.on(self.bases_), times)[known][:: self.every])
         state = np.concatenate(states)
         self.classes_, counts = np.unique(state, return_counts=True)
         if len(self.classes_) < 2:
@@ -111,7 +115,9 @@ class BoostingLabeller(TakeLabeller):
                 f"the training takes show {len(self.classes_)} label, a sequence model needs two or more",
                 hint="train on more takes, or look at their annotations",
             )
-        worth = dict(zip(self.classes_, (len(state) / counts / len(counts)) ** self.balance, strict=True))
+        worth: dict[str, float] = dict(
+            zip(self.classes_, (len(state) / counts / len(counts)) ** self.balance, strict=True)
+        )
         self.trees_ = HistGradientBoostingClassifier(
             max_iter=self.iterations,
             learning_rate=self.rate,

@@ -20,15 +20,17 @@ NORMALISATIONS = {
     "none": "weights as they are",
     "signer": "weights less the signer's mean, over their spread",
     "range": "weights less the low end of the signer's range, over half of it",
+    "middle": "weights less the signer's median, over half the span of their middle two thirds",
 }
 
 #: Those that need the level of the signer.
-BY_SIGNER = ("signer", "range")
+BY_SIGNER = ("signer", "range", "middle")
 
 #: How a segment gets its label. name: what it is.
 AGGREGATES = {
     "mean": "the label of the segment's mean descriptor (thesis, eq. 4.6)",
     "frames": "the label with the highest mean log probability over the segment's frames",
+    "course": "the label of how each column runs through the segment; learnt from whole segments",
 }
 
 #: Classifiers of frames. name: what it is.
@@ -38,6 +40,7 @@ NAMES = {
     "svm-linear": "support vector machine, linear kernel",
     "svm-rbf": "support vector machine, Gaussian kernel",
     "forest": "random forest",
+    "extra-trees": "extremely randomised trees",
 }
 
 #: Sequence models, which find boundaries and labels at once. name: what it is.

@@ -22,6 +22,7 @@ METHODS = {
     "rbf-network": "a radial basis function network learnt from examples of the avatar",
     "gaussian-process": "Gaussian process regression learnt from examples of the avatar",
     "sparse-online-gp": "its sparse online form",
+    "measures": "no weights: brows, lids and mouth measured from rest, mm",
 }
 
 
@@ -96,6 +97,13 @@ class SolveSettings(Settings):
         help="least-moving: carry the head by the least-moving markers where head markers do not suffice",
         choices=("least-moving",),
         metavar="least-moving",
+    )
+    read_as: str | None = option(
+        None,
+        help="aus: take the action units of an OpenFace table, and not its landmarks",
+        choices=("aus",),
+        flag="--as",
+        metavar="aus",
     )
 
     def __post_init__(self) -> None:

@@ -46,12 +46,12 @@ class TrainingSettings(Settings):
     normalise: str = option(
         "none",
         help="signer: weights less the signer's mean, over their spread, from all takes of the signer at hand; range: "
-        "less the low end of the signer's range, over half of it",
+        "less the low end of the signer's range, over half of it; middle: less the median, over the middle two thirds",
         choices=tuple(NORMALISATIONS),
     )
     aggregate: str = option(
         "mean",
-        help="label a segment by its mean descriptor (as in the thesis) or by all of its frames",
+        help="label a segment by its mean descriptor (as in the thesis), by all of its frames, or by its course",
         choices=tuple(AGGREGATES),
     )
     balanced: bool = option(False, help="let every label weigh the same in training", kind=bool)
@@ -79,6 +79,8 @@ class TrainingSettings(Settings):
             raise SignfaceError(problem, hint=f"choose among {', '.join(FEATURES)}")
         if len(set(self.features)) < len(self.features):
             raise SignfaceError(f"features are named twice: {', '.join(self.features)}")
+        if self.aggregate == "course" and self.search:
+            raise SignfaceError("parameters are searched on frames, and courses are of whole segments", hint="set them")
         if self.classifier in SEQUENCE_NAMES and not set(self.features) <= {"weights", "head"}:
             raise SignfaceError(
                 f"{self.classifier} makes its own features of the weights",

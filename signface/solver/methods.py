@@ -11,6 +11,7 @@ from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.settings.solve import METHODS
 from signface.solver.base import Solver
+from signface.solver.measures import FaceMeasures
 from signface.solver.rivals.direct import ThinShellDeformation
 from signface.solver.rivals.linear import Bounded, LeastSquares, NonNegative
 from signface.solver.thin_shell import ThinShellSolver
@@ -61,6 +62,8 @@ def make_solver(
     rivals = {"least-squares": LeastSquares, "nnls": NonNegative, "bounded": Bounded}
     if method in rivals:
         return rivals[method](face, layout)
+    if method == "measures":
+        return FaceMeasures(face, layout)
     if method == "direct-shell":
         return ThinShellDeformation(face, layout)
     from signface.solver.rivals import regression

@@ -156,7 +156,7 @@ def solve_pieces(
         solution = solver.solve(displacements)
         yield Descriptors(
             weights=solution.weights,
-            names=face.names,
+            names=solver.names,
             rate=recording.rate,
             start=recording.start + begin / recording.rate,
             residual=solution.residual,

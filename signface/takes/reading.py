@@ -40,7 +40,9 @@ def recognise(path: str | PathLike[str]) -> str:
     return format_of(path).name
 
 
-def open_recording(path: str | PathLike[str], *, unit: str | None = None) -> Take | TakeFile | Descriptors:
+def open_recording(
+    path: str | PathLike[str], *, unit: str | None = None, read_as: str | None = None
+) -> Take | TakeFile | Descriptors:
     """Open a recording of any supported format; the content says which it is, not the ending.
 
     Frames of C3D, TRC, TSV and CSV files are read in pieces when they are asked for. A `.pose` file cannot be: it is
@@ -51,6 +53,8 @@ def open_recording(path: str | PathLike[str], *, unit: str | None = None) -> Tak
     path : path
     unit : str, optional
         Unit of length of the file ("mm", "m", ...), where it says none or a wrong one.
+    read_as : str, optional
+        `aus`: the action units of an OpenFace table that holds landmarks too.
 
     Returns
     -------
@@ -75,12 +79,14 @@ def open_recording(path: str | PathLike[str], *, unit: str | None = None) -> Tak
     (1184, (100, 46, 3))
     """
     try:
-        return format_of(path).open(path, unit=unit)
+        return format_of(path, read_as).open(path, unit=unit)
     except SignfaceError as error:
         raise error.at(path) from error
 
 
-def read_recording(path: str | PathLike[str], *, unit: str | None = None) -> Take | Descriptors:
+def read_recording(
+    path: str | PathLike[str], *, unit: str | None = None, read_as: str | None = None
+) -> Take | Descriptors:
     """Read all of a recording into memory; parameters and errors are those of `open_recording`.
 
     See Also
@@ -94,7 +100,7 @@ def read_recording(path: str | PathLike[str], *, unit: str | None = None) -> Tak
     >>> type(recording).__name__, recording.duration
     ('Take', 5.92)
     """
-    recording = open_recording(path, unit=unit)
+    recording = open_recording(path, unit=unit, read_as=read_as)
     if not isinstance(recording, TakeFile):
         return recording
     try:

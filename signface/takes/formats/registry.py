@@ -219,13 +219,21 @@ def supported_formats() -> tuple[Format, ...]:
     return tuple(sorted(_formats.values(), key=lambda format: shipped.get(format.open.__module__, len(shipped))))
 
 
-def format_of(path: str | PathLike[str]) -> Format:
+def format_of(path: str | PathLike[str], read_as: str | None = None) -> Format:
     """The format of a file, told by its content.
+
+    Parameters
+    ----------
+    path : path
+    read_as : str, optional
+        The name of the format wanted, for files that may be read in several ways: `aus` for an OpenFace table that
+        holds landmarks and action units.
 
     Raises
     ------
     SignfaceError
-        The file is missing, empty, a folder, unreadable, or of no format that signface reads.
+        The file is missing, empty, a folder, unreadable, or of no format that signface reads; or not of the one
+        wanted.
 
     See Also
     --------
@@ -234,6 +242,11 @@ def format_of(path: str | PathLike[str]) -> Format:
     head = _head(Path(path))
     formats = supported_formats()
     certainties = [(format.certainty(head), number, format) for number, format in enumerate(formats)]
+    if read_as is not None:
+        wanted = [format for certainty, _, format in certainties if format.name == read_as and certainty > 0]
+        if not wanted:
+            raise SignfaceError(f"cannot be read as {read_as}", file=path, hint="read it as what it is: leave out --as")
+        return wanted[0]
     certainty, _, surest = max(certainties, key=lambda entry: entry[:2])
     if certainty > 0:
         return surest
