@@ -9,7 +9,7 @@ an annotation for ELAN.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -37,6 +37,67 @@ if TYPE_CHECKING:
     from signface.takes.recording import Recording
 
 
+@dataclass(frozen=True, eq=False)
+class Clause(Content):
+    """What one more model found in a take: questions, negation, raised brows, whatever it was trained on.
+
+    Parameters
+    ----------
+    tier : str
+        `clause`, or the tier that the model was trained on.
+    segments : Segments
+        Labelled, with confidence; what the model calls blank is not among them.
+    vocabulary : Vocabulary
+        What the labels stand for.
+    model : str
+        Its name.
+    """
+
+    tier: str
+    segments: Segments
+    vocabulary: Vocabulary
+    model: str
+
+
+def find_clause(recording: Recording | Descriptors, model: TrainedModel, *, signer: Signer | None = None) -> Clause:
+    """The segments that a model finds in a recording, which is solved as the model's own takes were.
+
+    Parameters
+    ----------
+    recording : Take, TakeFile or Descriptors
+        Descriptors are taken as they are. For a model of action units, read them as such:
+        `signface.open_recording(path, read_as="aus")`.
+    model : TrainedModel
+        Of any tier.
+    signer : Signer, optional
+        Whose level is used where it is of the model's columns.
+
+    Raises
+    ------
+    SignfaceError
+        The recording does not have the model's columns.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> find_clause(sf.datasets.mini_weights(), sf.load_model("default")).tier
+    'affect'
+    """
+    from signface.label.labelling import find_segments
+    from signface.settings.solve import SolveSettings
+    from signface.solver.solving import solve
+
+    own = SolveSettings.from_dict(model.card.solve) if model.card.solve else None
+    descriptors = solve(recording, settings=own, signer=signer)
+    level = None if signer is None else signer.level
+    if level is not None and not set(model.card.bases) <= set(level.names):
+        level = None
+    found = find_segments(descriptors, model, level=None if level is None else level.on(model.card.bases))
+    blank = model.card.vocabulary.blank
+    table = found.table[found.table["label"] != blank].reset_index(drop=True) if blank else found.table
+    return Clause(model.card.tier, found.changed("find_clause", table), model.card.vocabulary, model.name)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Annotation(Content):
     """Everything that was found in one take. `print` says it in plain words, on one line.
@@ -55,6 +116,8 @@ class Annotation(Content):
         Whose take it is.
     card : Card, optional
         What the model is and where it comes from.
+    clauses : tuple of Clause
+        What further models found, each on its tier.
 
     See Also
     --------
@@ -78,6 +141,7 @@ class Annotation(Content):
     channels: Mapping[str, ChannelEvents] | None = None
     signer: Signer = field(default_factory=Signer)
     card: Card | None = field(default=None, compare=False)
+    clauses: tuple[Clause, ...] = ()
 
     @property
     def name(self) -> str:
@@ -162,6 +226,7 @@ def annotate(
     settings: SolveSettings | None = None,
     signer: Signer | None = None,
     channels: bool | str | PathLike[str] | Mapping[str, Mapping[str, Any]] = False,
+    clauses: Sequence[TrainedModel | Clause] = (),
     face: FaceModel | None = None,
     layout: MarkerLayout | None = None,
 ) -> Annotation:
@@ -182,6 +247,8 @@ def annotate(
         Also find the further channels and, where the model gives no intensity, the intensity of the affect by its
         rule: True for the shipped thresholds, or a file of one's own, or what `signface.channels.rules.read_channels`
         returns.
+    clauses : sequence of TrainedModel or Clause
+        Further models, whose segments get tiers of their own; or what `find_clause` found by them.
     face, layout : optional
         In place of those that the settings name.
 
@@ -216,7 +283,16 @@ def annotate(
         events = {event.channel: event for event in find_channels(descriptors, thresholds, level=signer.level)}
         if "intensity" in thresholds and "intensity" not in segments.table and model.card.tier == "affect":
             segments = find_intensities(descriptors, segments, thresholds)
-    return Annotation(descriptors, segments, model.name, events, signer, model.card)
+    found = tuple(
+        one if isinstance(one, Clause) else find_clause(_fitting(one, descriptors, recording), one, signer=signer)
+        for one in clauses
+    )
+    return Annotation(descriptors, segments, model.name, events, signer, model.card, found)
+
+
+def _fitting(model: TrainedModel, descriptors: Descriptors, recording: Recording | Descriptors) -> Any:
+    """The descriptors where they have the model's columns, or else the recording, to be solved as the model wants."""
+    return descriptors if set(model.card.bases) <= set(descriptors.names) else recording
 
 
 def median_known(values: np.ndarray) -> float | None:

@@ -103,6 +103,18 @@ class SignerLevel(Content):
 
         return Descriptors(self.sample, self.names, rate=1.0, head=self.head, name="level")
 
+    def on(self, names: Sequence[str]) -> SignerLevel:
+        """The level of these columns only, in this order.
+
+        Raises
+        ------
+        ValueError
+            It does not know one of them.
+        """
+        place = [self.names.index(name) for name in names]
+        sample = None if self.sample is None else self.sample[:, place]
+        return SignerLevel(tuple(names), self.mean[place], self.spread[place], self.solve, sample, self.head)
+
     def plain(self) -> dict[str, Any]:
         """As plain values, for JSON."""
         content: dict[str, Any] = {

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import sys
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,14 +28,16 @@ from signface.settings.eaf import EafOptions
 from signface.settings.solve import SolveSettings
 
 if TYPE_CHECKING:
-    from signface.annotation import Annotation
+    from signface.annotation import Annotation, Clause
     from signface.descriptors import Descriptors
     from signface.face.model import FaceModel
     from signface.label.model import TrainedModel
+    from signface.signer import Signer
 
 EXAMPLE = """  signface annotate take.c3d -o take.eaf
   signface annotate recordings/*.c3d -o annotated/ --signer S1
-  signface annotate take.c3d --into corrected.eaf --channels"""
+  signface annotate take.c3d --into corrected.eaf --channels
+  signface annotate openface/*.csv -o annotated/ --signer S1 --channels --clause lse-questions"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,6 +49,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_solve_arguments(parser)
     parser.add_argument(
         "--classifier", default="default", metavar="NAME_OR_FILE", help="a shipped classifier or a .skops file"
+    )
+    parser.add_argument(
+        "--clause",
+        action="append",
+        default=[],
+        metavar="NAME_OR_FILE",
+        help="a further model, of any tier, whose segments get a tier of their own; may be given several times",
     )
     parser.add_argument("--signer", default="", metavar="NAME", help="names the tiers: affect@NAME")
     parser.add_argument("--video", type=Path, metavar="FILE", help="film of the take, linked in the .eaf")
@@ -96,20 +106,19 @@ def run(arguments: argparse.Namespace) -> int:
         model = beside.submit(_load_model, arguments.classifier)
         face, layout = read_face_and_layout(settings)
         known: dict[Path, Descriptors] = {}
-        if len(takes) > 1 and signer.level is None and model.result().card.normalise in BY_SIGNER:
-            for take in progress(takes, "solving"):
-                with contextlib.suppress(SignfaceError):  # said when its turn comes
-                    known[take] = solve(
-                        open_recording(take, read_as=settings.read_as), face, layout, settings=settings, signer=signer
-                    )
-            signer = signer.with_level(list(known.values())) if known else signer
+        if len(takes) > 1 and signer.level is None:
+            signer, known = _of_all(takes, settings, signer, wanted=model.result().card.normalise in BY_SIGNER)
+        from signface.label.persistence import load_model
+
+        further = [_Further(load_model(name, quickly=True), takes, signer) for name in arguments.clause]
         for take, file in progress(list(zip(takes, files, strict=True)), "annotating"):
             path, into = (file, None) if arguments.into is None else (None, file)
             try:
                 descriptors = known.get(take) or solve(
                     open_recording(take, read_as=settings.read_as), face, layout, settings=settings, signer=signer
                 )
-                result = annotate(descriptors, model.result(), signer=signer, channels=channels)
+                clauses = [one.found(take) for one in further]
+                result = annotate(descriptors, model.result(), signer=signer, channels=channels, clauses=clauses)
                 from signface.elan.writing import write_eaf  # imported beside the solve, by _load_model
 
                 write_eaf(result, path, into=into, options=options, video=arguments.video, replace=arguments.replace)
@@ -124,6 +133,53 @@ def run(arguments: argparse.Namespace) -> int:
     if failed:
         print(f"signface: {failed} of {len(takes)} takes could not be annotated", file=sys.stderr)
     return 2 if failed else 0
+
+
+def _of_all(
+    takes: list[Path], settings: SolveSettings, signer: Signer, *, wanted: bool
+) -> tuple[Signer, dict[Path, Descriptors]]:
+    """The signer with the rest and level of all takes, and the takes solved.
+
+    Where it is not `wanted`, only for landmarks: a short take of them says little of where the face rests.
+    """
+    from signface.descriptors import Descriptors
+    from signface.face.layout_files import choose_layout
+    from signface.face.reading import read_face
+    from signface.solver.signer_rest import learn_signer
+    from signface.takes.reading import open_recording
+
+    openers = [partial(open_recording, take, read_as=settings.read_as) for take in takes]
+    try:
+        first = openers[0]()
+        of_landmarks = not isinstance(first, Descriptors) and choose_layout(first.labels, read_face()).of_landmarks
+    except SignfaceError:
+        of_landmarks = False
+    if not (wanted or of_landmarks):
+        return signer, {}
+    try:
+        signer, solved = learn_signer(progress(openers, "solving"), settings, signer)
+    except SignfaceError:  # said of each take when its turn comes
+        return signer, {}
+    return signer, {take: one for take, one in zip(takes, solved, strict=True) if one is not None}
+
+
+class _Further:
+    """A model of `--clause`, with the takes solved and the signer's level as its own takes were."""
+
+    def __init__(self, model: TrainedModel, takes: list[Path], signer: Signer) -> None:
+        self.model, self.settings = model, SolveSettings.from_dict(model.card.solve)
+        self.signer, self.known = signer, dict[Path, Descriptors]()
+        fits = signer.level is not None and set(model.card.bases) <= set(signer.level.names)
+        if len(takes) > 1 and model.card.normalise in BY_SIGNER and not fits:
+            self.signer, self.known = _of_all(takes, self.settings, replace(signer, level=None), wanted=True)
+
+    def found(self, take: Path) -> Clause:
+        """What the model finds in a take."""
+        from signface.annotation import find_clause
+        from signface.takes.reading import open_recording
+
+        recording = self.known.get(take) or open_recording(take, read_as=self.settings.read_as)
+        return find_clause(recording, self.model, signer=self.signer)
 
 
 def _import_shared() -> None:

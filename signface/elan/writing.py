@@ -220,6 +220,10 @@ def prepare(
         facts = {**annotation.facts, **facts}
         others = (event for event in (annotation.channels or {}).values() if event.channel != tier)
         tiers = channel_tiers(others, signer)
+        tiers += [
+            label_tier(one.segments, signer, channel=one.tier, vocabulary=one.vocabulary)
+            for one in getattr(annotation, "clauses", ())
+        ]
     if options.doubtful is not None:
         tiers = [doubtful_tier(segments, signer, below=options.doubtful, channel=tier, vocabulary=vocabulary), *tiers]
     all_tiers = (label_tier(segments, signer, channel=tier, vocabulary=vocabulary), *tiers)

@@ -137,20 +137,24 @@ class BoostingLabeller(TakeLabeller):
         return np.column_stack([probability, np.zeros(len(probability))])
 
     def find(self, take: Descriptors) -> tuple[np.ndarray, list[tuple[int, int, int]]]:
-        """See `TakeLabeller`; between two segments stands a transition of no duration."""
+        """See `TakeLabeller`; the segments follow each other without transitions."""
         among = self.label_probabilities(take)
         path = likeliest_path(np.log(among.clip(1e-6)), self.stay)
-        course: list[tuple[int, int, int]] = []
-        for start, end in stretches(path).tolist():
-            if course:
-                course.append((start, start, -1))
-            course.append((start, end, int(path[start])))
-        return among, course
+        return among, [(start, end, int(path[start])) for start, end in stretches(path).tolist()]
 
     def annotate(self, take: Descriptors) -> Segments:
-        """The segments of a take with `label` and `confidence`, one after the other without transitions."""
-        segments = super().annotate(take)
-        return segments.changed("annotate", segments.table.query("kind == 'stable'").reset_index(drop=True))
+        """The segments of a take with `label` and `confidence`, one after the other."""
+        import pandas as pd
+
+        among, course = self.find(take)
+        step = take.duration / len(among)
+        rows = [
+            (take.start + first * step, take.start + last * step, "stable", str(self.classes_[code]))
+            for first, last, code in course
+        ]
+        table = pd.DataFrame(rows, columns=["start_s", "end_s", "kind", "label"])
+        table["confidence"] = [float(among[first:last, code].mean()) for first, last, code in course]
+        return Segments(table, name=take.name, history=take.history)
 
 
 def likeliest_path(scores: np.ndarray, stay: float) -> np.ndarray:

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
@@ -102,7 +103,7 @@ def learn_signer(
     recordings: Iterable[Callable[[], Recording | Descriptors]],
     settings: SolveSettings | None = None,
     signer: Signer | None = None,
-) -> tuple[Signer, list[Descriptors]]:
+) -> tuple[Signer, list[Descriptors | None]]:
     """A signer with the rest and the level of all of their takes, and these takes solved from that rest.
 
     Landmarks have a rest; markers, which are glued on anew each time, and weights have a level only.
@@ -113,6 +114,11 @@ def learn_signer(
         Each opens a take; called up to twice, so that not all lie in memory.
     settings, signer : optional
         As of `signface.solve`; a rest that is known stays.
+
+    Returns
+    -------
+    Signer, list of Descriptors or None
+        None for a take that cannot be solved.
 
     Raises
     ------
@@ -125,21 +131,25 @@ def learn_signer(
     if signer.rest is None and settings.neutral == "auto":
         landmarks, layout = [], None
         for opener in openers:
-            recording = opener()
-            if isinstance(recording, Descriptors):
-                continue
-            _, found = face_and_layout(recording.labels, settings)
-            if found.of_landmarks:
-                landmarks.append(recording)
-                layout = found
+            with contextlib.suppress(SignfaceError):  # said when it is solved
+                recording = opener()
+                if isinstance(recording, Descriptors):
+                    continue
+                _, found = face_and_layout(recording.labels, settings)
+                if found.of_landmarks:
+                    landmarks.append(recording)
+                    layout = found
         if layout is not None:
             signer = replace(signer, rest=signer_rest(landmarks, layout))
-    solved, problem = [], SignfaceError("there is no take of the signer")
+    solved: list[Descriptors | None] = []
+    problem = SignfaceError("there is no take of the signer")
     for opener in openers:
         try:
             solved.append(solve(opener(), settings=settings, signer=signer))
         except SignfaceError as error:
             problem = error
-    if not solved:
+            solved.append(None)
+    whole = [take for take in solved if take is not None]
+    if not whole:
         raise problem
-    return signer.with_level(solved), solved
+    return signer.with_level(whole), solved

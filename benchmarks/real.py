@@ -1,0 +1,407 @@
+"""How well real signers are annotated: `python -m benchmarks.real FOLDER`.
+
+FOLDER holds corpora of OpenFace recordings with human annotations, each a folder with a `takes.csv`: `krsl` (tiers
+brows and head), `lse` (tier CNM_tipo), `buhmap` (tier movement); those that are not there are passed over. Every
+person is annotated by what was learnt of the others (leave one signer out); with `--others FOLDER` the persons of the
+second folder are, by what was learnt of all in the first. Nothing is chosen on the persons that are judged, but where
+the table says so. Intervals (95 %) are drawn over signers, 2,000 times.
+
+A signer's rest and level come from all of their recordings and no annotation; the takes of one person are never on
+both sides.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from joblib import Parallel, delayed
+
+from signface.channels.rules import find_channels
+from signface.corpus.examples import solve_corpus
+from signface.corpus.levels import learn_signers
+from signface.corpus.manifest import read_corpus
+from signface.frames import hysteresis, runs
+from signface.head import head_angles
+from signface.label.labelling import find_segments, label_spans
+from signface.label.vocabulary import NONE, Vocabulary
+from signface.learn.examples import Example
+from signface.learn.fitting import fit_model
+from signface.metrics.agreement import match_annotations
+from signface.metrics.bootstrap import cluster_draws
+from signface.segmentation.segments import Segments
+from signface.settings.solve import SolveSettings
+from signface.settings.training import TrainingSettings
+
+WEIGHTS, MEASURES, UNITS = SolveSettings(), SolveSettings(method="measures"), SolveSettings(read_as="aus")
+FRAME_S, DRAWS = 0.04, 2000
+SENTENCES = TrainingSettings(classifier="boosting", features=("weights", "head"), normalise="range")
+CLIPS = TrainingSettings(
+    classifier="extra-trees",
+    features=("weights", "head"),
+    normalise="middle",
+    aggregate="course",
+    balanced=True,
+)
+
+#: A fold: who is trained on, and who is judged.
+Fold = tuple[list[Example], list[Example]]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of the table: numbers of what was judged, with their intervals."""
+
+    corpus: str
+    what: str
+    how: str
+    values: dict[str, tuple[float, float, float]]
+
+    def cells(self) -> list[str]:
+        """As Markdown."""
+        said = "; ".join(f"{name} {v:.2f} ({low:.2f} to {high:.2f})" for name, (v, low, high) in self.values.items())
+        return [self.corpus, self.what, self.how, said]
+
+
+class Real:
+    """A corpus with signers learnt, in a folder of its own beside which nothing is written."""
+
+    def __init__(self, folder: Path, work: Path) -> None:
+        self.folders: dict[str, Path] = {}
+        for source in sorted(folder.iterdir()):
+            for place in (source, source / source.name):
+                if (place / "takes.csv").is_file():
+                    self.folders[source.name] = place
+        self.work = work
+
+    def examples(self, corpus: str, settings: SolveSettings, tier: str, sparse: bool = False) -> list[Example]:
+        """The annotated takes of a corpus, with the level of each signer over all of theirs."""
+        place = self.work / f"{corpus}-{settings.digest[:8]}"
+        if not place.is_dir():
+            place.mkdir(parents=True)
+            for file in self.folders[corpus].iterdir():
+                (place / file.name).symlink_to(file.resolve())
+            for signer in learn_signers(read_corpus(place), settings):
+                (place / "signers").mkdir(exist_ok=True)
+                signer.save(place / "signers" / f"{signer.name}.json")
+        return solve_corpus(read_corpus(place), settings=settings, tier=tier, sparse=sparse)
+
+
+def only(examples: Sequence[Example], labels: Sequence[str], unknown: Sequence[str] = ()) -> list[Example]:
+    """The examples with these labels alone: others are `none`, and what is unknown is not annotated."""
+    vocabulary = Vocabulary("real", (*labels, NONE))
+    kept = []
+    for example in examples:
+        table = example.reference.table.copy()
+        table = table[~table["label"].isin(unknown)]
+        table["label"] = table["label"].where(table["label"].isin(labels), NONE)
+        rows: list[list[object]] = []
+        for row in table[["start_s", "end_s", "kind", "label"]].values.tolist():
+            if rows and rows[-1][3] == row[3] and abs(row[0] - rows[-1][1]) < 0.0015:
+                rows[-1][1] = row[1]
+            else:
+                rows.append(row)
+        joined = pd.DataFrame(rows, columns=["start_s", "end_s", "kind", "label"])
+        kept.append(replace(example, reference=Segments(joined, name=example.take), vocabulary=vocabulary))
+    return kept
+
+
+def folds_of(examples: list[Example], others: list[Example] | None) -> list[Fold]:
+    """One signer left out at a time; or all of these on one side and the others on the other."""
+    if others is not None:
+        return [(examples, others)]
+    signers = sorted({example.signer for example in examples})
+    return [([e for e in examples if e.signer != s], [e for e in examples if e.signer == s]) for s in signers]
+
+
+def learnt_segments(fold: Fold, settings: TrainingSettings) -> list[tuple[Example, pd.DataFrame]]:
+    """What a model of the one side finds in the takes of the other."""
+    warnings.simplefilter("ignore")
+    model = fit_model(fold[0], settings)
+    return [(e, find_segments(e.descriptors, model, level=e.level).table) for e in fold[1]]
+
+
+def learnt_labels(fold: Fold, settings: TrainingSettings) -> list[tuple[str, str, str]]:
+    """Signer, true label and found label of each given segment of the other side."""
+    warnings.simplefilter("ignore")
+    model, rows = fit_model(fold[0], settings), []
+    for example in fold[1]:
+        spans = example.stable[["start_s", "end_s"]].to_numpy(float)
+        found, _ = label_spans(example.descriptors, spans, model, level=example.level)
+        rows += [(example.signer, str(t), f) for t, f in zip(example.stable["label"], found, strict=True)]
+    return rows
+
+
+def side_by_side(work: Callable[..., list], folds: list[Fold], *more: object) -> list:
+    """All folds on the cores of this machine."""
+    parts = Parallel(n_jobs=min(2, len(folds)))(delayed(work)(fold, *more) for fold in folds)
+    return [row for part in parts for row in part]
+
+
+def judged_sentences(found: list[tuple[Example, pd.DataFrame]], labels: Sequence[str]) -> dict:
+    """Kappa and F1 of frames, F1 of segments, false alarms in takes without any, with intervals over signers."""
+    order = [NONE, *labels]
+    signers = sorted({example.signer for example, _ in found})
+    counts = np.zeros((len(signers), len(order), len(order)))
+    segments, alarms = np.zeros((len(signers), 3)), np.zeros((len(signers), 2))
+    for example, table in found:
+        row = signers.index(example.signer)
+        times = np.arange(
+            example.descriptors.start + FRAME_S / 2, example.descriptors.start + example.descriptors.duration, FRAME_S
+        )
+        truth, said = (value_codes(t, times, order) for t in (example.reference.table, table))
+        np.add.at(counts[row], (truth[truth >= 0], np.maximum(said, 0)[truth >= 0]), 1)
+        true, hit = (t[t["label"].isin(labels)] for t in (example.reference.table, table))
+        for label in labels:
+            a, b = (t[t["label"] == label].reset_index(drop=True) for t in (true, hit))
+            segments[row] += (len(match_annotations(a, b, overlap=0.5)), len(a), len(b))
+        if not len(true):
+            alarms[row] += (len(hit) > 0, 1)
+    times = np.concatenate([np.ones((1, len(signers))), cluster_draws(len(signers), DRAWS)])
+    drawn = np.einsum("ds,sij->dij", times, counts)
+    parts, alarm = times @ segments, times @ alarms
+    with np.errstate(invalid="ignore", divide="ignore"):
+        values = {
+            "kappa": kappas(drawn),
+            "F1 frames": macro_f1(drawn),
+            "F1 segments": 2 * parts[:, 0] / (parts[:, 1] + parts[:, 2]),
+            "false alarms": alarm[:, 0] / alarm[:, 1],
+        }
+    return {name: interval(value) for name, value in values.items() if np.isfinite(value[0])}
+
+
+def value_codes(table: pd.DataFrame, times: np.ndarray, order: list[str]) -> np.ndarray:
+    """(K,) place in `order` of what a table says at each time; -1 where it says nothing."""
+    codes = np.full(len(times), -1)
+    for start, end, label in table[["start_s", "end_s", "label"]].itertuples(index=False):
+        codes[(times >= start) & (times < end)] = order.index(label) if label in order else 0
+    return codes
+
+
+def kappas(counts: np.ndarray) -> np.ndarray:
+    """(D,) Cohen's kappa of (D, L, L) counts."""
+    total = counts.sum(axis=(1, 2))
+    agreed = np.trace(counts, axis1=1, axis2=2) / total
+    chance = (counts.sum(axis=1) * counts.sum(axis=2)).sum(axis=1) / total**2
+    return (agreed - chance) / (1 - chance)
+
+
+def macro_f1(counts: np.ndarray) -> np.ndarray:
+    """(D,) mean F1 over all labels but the first."""
+    hit = np.diagonal(counts, axis1=1, axis2=2)[:, 1:]
+    return (2 * hit / (counts.sum(axis=1) + counts.sum(axis=2))[:, 1:]).mean(axis=1)
+
+
+def judged_labels(rows: list[tuple[str, str, str]]) -> dict:
+    """Share of right labels, with its interval over signers."""
+    signers = sorted({signer for signer, *_ in rows})
+    right = np.array([sum(s == name and t == f for s, t, f in rows) for name in signers])
+    total = np.array([sum(s == name for s, *_ in rows) for name in signers])
+    times = np.concatenate([np.ones((1, len(signers))), cluster_draws(len(signers), DRAWS)])
+    return {"right": interval((times @ right) / (times @ total)), "of": (float(total.sum()),) * 3}
+
+
+def interval(values: np.ndarray) -> tuple[float, float, float]:
+    """The value, and the ends of the middle 95 % of those drawn."""
+    low, high = np.nanquantile(values[1:], [0.025, 0.975])
+    return float(values[0]), float(low), float(high)
+
+
+def by_rule(examples: list[Example], channel: str, names: dict[str, str], levels: bool) -> list:
+    """What the shipped rules find, with or without the level of the signer; `names` of their values."""
+    found = []
+    for example in examples:
+        level = example.level if levels else None
+        events = {e.channel: e.table for e in find_channels(example.descriptors, level=level)}.get(channel)
+        table = pd.DataFrame(columns=["start_s", "end_s", "value"]) if events is None else events
+        said = [next((mine for word, mine in names.items() if word in str(v)), NONE) for v in table["value"]]
+        found.append((example, table.assign(label=said)))
+    return found
+
+
+def by_distance(folds: list[Fold], label: str) -> list[tuple[Example, pd.DataFrame]]:
+    """The plain rule: brow height over the take's median, with the thresholds that suit the other signers best."""
+    grid = [(on, share * on, ms) for on in (0.5, 1.0, 1.5, 2.0, 3.0, 4.0) for share in (0.5, 0.8) for ms in (100, 240)]
+
+    def found(example: Example, on: float, off: float, ms: float) -> pd.DataFrame:
+        take = example.descriptors
+        height = take.weight("browHeight")
+        active = hysteresis(np.nan_to_num(height - np.nanmedian(height), nan=-9.0), on, off)
+        spans = [(a / take.rate, b / take.rate) for a, b in runs(active) if (b - a) / take.rate >= ms / 1000]
+        return pd.DataFrame([(take.start + a, take.start + b, label) for a, b in spans], columns=COLUMNS)
+
+    result = []
+    for train, test in folds:
+        scores = [judged_sentences([(e, found(e, *g)) for e in train], [label])["kappa"][0] for g in grid]
+        best = grid[int(np.nanargmax(scores))]
+        result += [(e, found(e, *best)) for e in test]
+    return result
+
+
+COLUMNS = ["start_s", "end_s", "label"]
+
+
+def leak(weights: list[Example], measures: list[Example]) -> dict:
+    """|r| of brow signals with the head's pitch in takes without any annotation of brows, within takes."""
+    quiet = [i for i, e in enumerate(weights) if set(e.stable["label"]) == {NONE}]
+    signals = {"plain distance": [], "weights, up less down": [], "the rule's signal": [], "pitch": []}
+    for i in quiet:
+        take, measured = weights[i].descriptors, measures[i].descriptors
+        pitch = head_angles(take)["pitch"]
+        up = np.mean([take.weight(b) for b in ("browInnerUp", "browOuterUpLeft", "browOuterUpRight")], axis=0)
+        net = up - np.mean([take.weight(b) for b in ("browDownLeft", "browDownRight")], axis=0)
+        for name, signal in zip(
+            signals, (measured.weight("browHeight"), net, net + 0.0075 * pitch, pitch), strict=True
+        ):
+            signals[name].append(signal - np.nanmean(signal))
+    whole = {name: np.concatenate(parts) for name, parts in signals.items()}
+    known = np.isfinite(np.array(list(whole.values()))).all(axis=0)
+    return {n: float(np.corrcoef(v[known], whole["pitch"][known])[0, 1]) for n, v in whole.items() if n != "pitch"}
+
+
+def krsl(here: Real, others: Real | None) -> list[Row]:
+    """Brows, head, and the type of the sentence."""
+
+    def load(settings: SolveSettings, tier: str, labels: list[str]) -> tuple[list[Example], list[Fold]]:
+        mine = only(here.examples("krsl", settings, tier), labels)
+        judged = None if others is None else only(others.examples("krsl", settings, tier), labels)
+        return (mine if judged is None else judged), folds_of(mine, judged)
+
+    rows, what = [], "raised brows"
+    judged, _ = load(WEIGHTS, "brows", ["br_raise"])
+    measured, folds = load(MEASURES, "brows", ["br_raise"])
+    names = {"raised": "br_raise"}
+    for how, found in (
+        ("brow distance over the take's median", by_distance(folds, "br_raise")),
+        ("shipped rule, one take alone", by_rule(judged, "brows", names, levels=False)),
+        ("shipped rule, signer's level (thresholds chosen on these signers)", by_rule(judged, "brows", names, True)),
+        ("boosting on measures and head", side_by_side(learnt_segments, folds, SENTENCES)),
+    ):
+        rows.append(Row("KRSL", what, how, judged_sentences(found, ["br_raise"])))
+    leaks = leak(judged, measured)
+    rows.append(Row("KRSL", "r of brows with pitch at rest", "", {n: (r, r, r) for n, r in leaks.items()}))
+    rules = {"nod": {"nod": "nod"}}
+    for label in ("nod", "chin_up", "turn_forward"):
+        judged, folds = load(MEASURES, "head", [label])
+        if label in rules:
+            rule = by_rule(judged, "head", rules[label], levels=False)
+            rows.append(Row("KRSL", label, "shipped rule", judged_sentences(rule, [label])))
+        found = side_by_side(learnt_segments, folds, SENTENCES.changed(balanced=True))
+        rows.append(Row("KRSL", label, "boosting on measures and head", judged_sentences(found, [label])))
+    judged, folds = load(MEASURES, "brows", ["br_raise"])
+    typed = [tuple(whole(side, lambda e: e.kind) for side in fold) for fold in folds]
+    rows.append(
+        Row("KRSL", "sentence type", "trees on courses", judged_labels(side_by_side(learnt_labels, typed, CLIPS)))
+    )
+    return rows
+
+
+def whole(examples: list[Example], label: Callable[[Example], str]) -> list[Example]:
+    """The takes as one segment each."""
+    result = []
+    for example in examples:
+        row = (
+            example.descriptors.start,
+            example.descriptors.start + example.descriptors.duration,
+            "stable",
+            label(example),
+        )
+        table = pd.DataFrame([row], columns=["start_s", "end_s", "kind", "label"])
+        words = Vocabulary("kinds", tuple(sorted({label(other) for other in examples})))
+        result.append(replace(example, reference=Segments(table, name=example.take), vocabulary=words))
+    return result
+
+
+def buhmap(here: Real, others: Real | None) -> list[Row]:
+    """Isolated signs of the head and face."""
+    mine = here.examples("buhmap", MEASURES, "movement", sparse=True)
+    judged = None if others is None else others.examples("buhmap", MEASURES, "movement", sparse=True)
+    rows = side_by_side(learnt_labels, folds_of(mine, judged), CLIPS)
+    return [Row("BUHMAP", "clips, 8 classes", "trees on courses of measures and head", judged_labels(rows))]
+
+
+def lse(here: Real, others: Real | None) -> list[Row]:
+    """Questions and negation: given segments, and found in whole sentences."""
+    labels, unknown = ["i.parcial", "i.polarizada", "n.no"], ["i.xeral", "n.resto"]
+
+    def load(settings: SolveSettings) -> list[Fold]:
+        mine = only(here.examples("lse", settings, "CNM_tipo"), labels, unknown)
+        judged = None if others is None else only(others.examples("lse", settings, "CNM_tipo"), labels, unknown)
+        return folds_of(mine, judged)
+
+    def given(folds: list[Fold]) -> list[Fold]:
+        kept = []
+        for fold in folds:
+            sides = []
+            for side in fold:
+                shown = [e for e in side if set(e.stable["label"]) - {NONE}]
+                tables = [e.stable[e.stable["label"] != NONE].reset_index(drop=True) for e in shown]
+                sides.append([replace(e, reference=Segments(t)) for e, t in zip(shown, tables, strict=True)])
+            kept.append((sides[0], sides[1]))
+        return kept
+
+    rows = []
+    units = [(with_units(a), with_units(b)) for a, b in load(UNITS)]
+    for how, folds in (("action units", units), ("measures", load(MEASURES))):
+        clips = CLIPS.changed(normalise="range")
+        right = judged_labels(side_by_side(learnt_labels, given(folds), clips))
+        rows.append(Row("LSE", "given segments, 3 classes", f"trees on courses of {how} and head", right))
+    found = side_by_side(learnt_segments, units, SENTENCES.changed(balanced=True))
+    how = "boosting on action units and head"
+    rows.append(Row("LSE", "found in sentences", how, judged_sentences(found, labels)))
+    return rows
+
+
+def with_units(examples: list[Example]) -> list[Example]:
+    """The examples with the intensities of action units alone."""
+    units = [name for name in examples[0].descriptors.names if name.endswith("_r")]
+    return [
+        replace(e, descriptors=e.descriptors.on(units), level=None if e.level is None else e.level.on(units))
+        for e in examples
+    ]
+
+
+def main() -> None:
+    """Judge every corpus that is there, and print one table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path, help="folder of corpora: krsl, lse, buhmap")
+    parser.add_argument("--others", type=Path, help="the same corpora of other persons, to be judged instead")
+    parser.add_argument("--only", nargs="+", choices=("krsl", "lse", "buhmap"), default=("krsl", "lse", "buhmap"))
+    parser.add_argument("-o", "--output", type=Path, help="a .json of the same numbers")
+    arguments = parser.parse_args()
+    os.environ["OMP_NUM_THREADS"] = "1"
+    warnings.simplefilter("ignore")
+    rows: list[Row] = []
+    with tempfile.TemporaryDirectory() as work:
+        here = Real(arguments.folder, Path(work) / "here")
+        others = None if arguments.others is None else Real(arguments.others, Path(work) / "others")
+        for judge in (krsl, lse, buhmap):
+            name = judge.__name__
+            if name not in here.folders or name not in arguments.only:
+                continue
+            if others is not None and name not in others.folders:
+                continue
+            start = time.perf_counter()
+            rows += judge(here, others)
+            print(f"{name}: {time.perf_counter() - start:.0f} s", file=sys.stderr, flush=True)
+    if not rows:
+        raise SystemExit(f"{arguments.folder} holds none of krsl, lse and buhmap, each with a takes.csv")
+    table = [["corpus", "what", "how", "value (95 % over signers)"], ["---"] * 4, *(row.cells() for row in rows)]
+    print("\n".join(f"| {' | '.join(cells)} |" for cells in table))
+    if arguments.output is not None:
+        content = [{"corpus": r.corpus, "what": r.what, "how": r.how, "values": r.values} for r in rows]
+        arguments.output.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
