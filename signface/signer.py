@@ -237,9 +237,10 @@ class Signer:
             return cls(name or "", bases=SignerBases.read(file))
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
+            name_there = str(content["name"])
             level, rest = content.get("level"), content.get("rest")
             signer = cls(
-                str(content["name"]),
+                name_there,
                 _bases(content.get("bases"), file),
                 None if level is None else SignerLevel.from_plain(level),
                 None if rest is None else SignerRest.from_plain(rest),

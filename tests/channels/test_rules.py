@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -10,11 +12,20 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from signface.channels.head import swings
-from signface.channels.rules import bridge, find_channels, find_intensities, hysteresis, long_enough, read_channels
+from signface.channels.rules import (
+    bridge,
+    find_channels,
+    find_intensities,
+    hysteresis,
+    long_enough,
+    read_channels,
+    signer_signal,
+)
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.head import head_angles
 from signface.segmentation.segments import Segments
+from signface.signer_level import signer_level
 
 BASES = (
     *("browInnerUp", "browOuterUpLeft", "browOuterUpRight", "browDownLeft", "browDownRight", "eyeBlinkLeft"),
@@ -251,3 +262,40 @@ def test_ones_own_thresholds_are_used(tmp_path):
     path.write_text('[jaw]\n[jaw.dropped]\nbases = ["jawOpen"]\non = 0.1\noff = 0.05\nmin_ms = 20\n')
     found = find_channels(moving(jawOpen=[(1.0, 1.1, 0.2)]), read_channels(path))
     assert [(events.channel, list(events.table["value"])) for events in found] == [("jaw", ["dropped"])]
+
+
+RULE = {
+    **{"bases": ["browInnerUp"], "on": 0.35, "off": 0.2, "min_ms": 100},
+    "signer": {"on": 0.9, "off": 0.75, "take": 0.5, "smooth_ms": 200, "minus": ["browDownLeft"]},
+}
+
+
+@given(scale=st.floats(0.2, 5), shift=st.floats(-1, 1))
+@settings(max_examples=25, deadline=None)
+def test_a_signers_signal_does_not_depend_on_how_strong_or_where_their_weights_are(scale, shift):
+    """Scaled and shifted, take and level alike, brows are as high as before."""
+    rng = np.random.default_rng(3)
+    take = moving(rate=25.0, browInnerUp=[(1.0, 2.0, 0.8)])
+    take = replace(take, weights=take.weights + rng.normal(0, 0.1, take.weights.shape))
+    other = replace(take, weights=scale * take.weights + shift * (np.array(BASES) == "browInnerUp"))
+    first, second = (signer_signal(one, RULE, signer_level([one])) for one in (take, other))
+    np.testing.assert_allclose(first, second, atol=0.02)
+
+
+def test_where_the_signer_is_known_their_range_decides():
+    """A raise of half the usual strength is one for a signer who never raises brows higher, and none otherwise."""
+    weak = moving(rate=25.0, seconds=6.0, **{base: [(1.0, 2.5, 0.2)] for base in BROWS_UP})
+    level = signer_level([weak])
+    by_level = {e.channel: e.table["value"].tolist() for e in find_channels(weak, level=level)}
+    assert by_level["brows"] == ["raised"]
+    assert events(weak, "brows") == []
+    low = {base: [(1.0, 2.5, 0.9)] for base in BROWS_UP}
+    strong = signer_level([weak, moving(rate=25.0, seconds=6.0, **low)])
+    assert {e.channel: len(e) for e in find_channels(weak, level=strong)}["brows"] == 0
+
+
+def test_a_signers_table_is_checked(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('[b]\n[b.up]\nbases = ["a"]\non = 1.0\noff = 0.5\nmin_ms = 9\n[b.up.signer]\non = 1.0\n')
+    with pytest.raises(SignfaceError, match=r"b\.up\.signer"):
+        read_channels(path)
