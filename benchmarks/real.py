@@ -37,6 +37,7 @@ from signface.label.labelling import find_segments, label_spans
 from signface.label.vocabulary import NONE, Vocabulary
 from signface.learn.examples import Example
 from signface.learn.fitting import fit_model
+from signface.learn.restriction import restricted
 from signface.metrics.agreement import match_annotations
 from signface.metrics.bootstrap import cluster_draws
 from signface.segmentation.segments import Segments
@@ -69,8 +70,11 @@ class Row:
 
     def cells(self) -> list[str]:
         """As Markdown."""
-        said = "; ".join(f"{name} {v:.2f} ({low:.2f} to {high:.2f})" for name, (v, low, high) in self.values.items())
-        return [self.corpus, self.what, self.how, said]
+        said = []
+        for name, (value, low, high) in self.values.items():
+            between = "" if low == high else f" ({low:.2f} to {high:.2f})"
+            said.append(f"{name} {value:g}" if name == "of" else f"{name} {value:.2f}{between}")
+        return [self.corpus, self.what, self.how, "; ".join(said)]
 
 
 class Real:
@@ -95,25 +99,6 @@ class Real:
                 (place / "signers").mkdir(exist_ok=True)
                 signer.save(place / "signers" / f"{signer.name}.json")
         return solve_corpus(read_corpus(place), settings=settings, tier=tier, sparse=sparse)
-
-
-def only(examples: Sequence[Example], labels: Sequence[str], unknown: Sequence[str] = ()) -> list[Example]:
-    """The examples with these labels alone: others are `none`, and what is unknown is not annotated."""
-    vocabulary = Vocabulary("real", (*labels, NONE))
-    kept = []
-    for example in examples:
-        table = example.reference.table.copy()
-        table = table[~table["label"].isin(unknown)]
-        table["label"] = table["label"].where(table["label"].isin(labels), NONE)
-        rows: list[list[object]] = []
-        for row in table[["start_s", "end_s", "kind", "label"]].values.tolist():
-            if rows and rows[-1][3] == row[3] and abs(row[0] - rows[-1][1]) < 0.0015:
-                rows[-1][1] = row[1]
-            else:
-                rows.append(row)
-        joined = pd.DataFrame(rows, columns=["start_s", "end_s", "kind", "label"])
-        kept.append(replace(example, reference=Segments(joined, name=example.take), vocabulary=vocabulary))
-    return kept
 
 
 def folds_of(examples: list[Example], others: list[Example] | None) -> list[Fold]:
@@ -249,6 +234,7 @@ def by_distance(folds: list[Fold], label: str) -> list[tuple[Example, pd.DataFra
 
 
 COLUMNS = ["start_s", "end_s", "label"]
+RULE_BY_LEVEL = "shipped rule, signer's level (thresholds chosen on K01, K02, K04, K08, K09)"
 
 
 def leak(weights: list[Example], measures: list[Example]) -> dict:
@@ -273,8 +259,8 @@ def krsl(here: Real, others: Real | None) -> list[Row]:
     """Brows, head, and the type of the sentence."""
 
     def load(settings: SolveSettings, tier: str, labels: list[str]) -> tuple[list[Example], list[Fold]]:
-        mine = only(here.examples("krsl", settings, tier), labels)
-        judged = None if others is None else only(others.examples("krsl", settings, tier), labels)
+        mine = restricted(here.examples("krsl", settings, tier), labels)
+        judged = None if others is None else restricted(others.examples("krsl", settings, tier), labels)
         return (mine if judged is None else judged), folds_of(mine, judged)
 
     rows, what = [], "raised brows"
@@ -284,18 +270,18 @@ def krsl(here: Real, others: Real | None) -> list[Row]:
     for how, found in (
         ("brow distance over the take's median", by_distance(folds, "br_raise")),
         ("shipped rule, one take alone", by_rule(judged, "brows", names, levels=False)),
-        ("shipped rule, signer's level (thresholds chosen on these signers)", by_rule(judged, "brows", names, True)),
+        (RULE_BY_LEVEL, by_rule(judged, "brows", names, levels=True)),
         ("boosting on measures and head", side_by_side(learnt_segments, folds, SENTENCES)),
     ):
         rows.append(Row("KRSL", what, how, judged_sentences(found, ["br_raise"])))
     leaks = leak(judged, measured)
     rows.append(Row("KRSL", "r of brows with pitch at rest", "", {n: (r, r, r) for n, r in leaks.items()}))
-    rules = {"nod": {"nod": "nod"}}
-    for label in ("nod", "chin_up", "turn_forward"):
+    for label, word in (("nod", "nod"), ("chin_up", "chin up"), ("turn_forward", "forward")):
+        judged, _ = load(WEIGHTS, "head", [label])
+        for how, levels in (("shipped rule, one take alone", False), (RULE_BY_LEVEL, True)):
+            found = by_rule(judged, "head", {word: label}, levels=levels)
+            rows.append(Row("KRSL", label, how, judged_sentences(found, [label])))
         judged, folds = load(MEASURES, "head", [label])
-        if label in rules:
-            rule = by_rule(judged, "head", rules[label], levels=False)
-            rows.append(Row("KRSL", label, "shipped rule", judged_sentences(rule, [label])))
         found = side_by_side(learnt_segments, folds, SENTENCES.changed(balanced=True))
         rows.append(Row("KRSL", label, "boosting on measures and head", judged_sentences(found, [label])))
     judged, folds = load(MEASURES, "brows", ["br_raise"])
@@ -335,8 +321,8 @@ def lse(here: Real, others: Real | None) -> list[Row]:
     labels, unknown = ["i.parcial", "i.polarizada", "n.no"], ["i.xeral", "n.resto"]
 
     def load(settings: SolveSettings) -> list[Fold]:
-        mine = only(here.examples("lse", settings, "CNM_tipo"), labels, unknown)
-        judged = None if others is None else only(others.examples("lse", settings, "CNM_tipo"), labels, unknown)
+        mine = restricted(here.examples("lse", settings, "CNM_tipo"), labels, unknown)
+        judged = None if others is None else restricted(others.examples("lse", settings, "CNM_tipo"), labels, unknown)
         return folds_of(mine, judged)
 
     def given(folds: list[Fold]) -> list[Fold]:
@@ -351,7 +337,7 @@ def lse(here: Real, others: Real | None) -> list[Row]:
         return kept
 
     rows = []
-    units = [(with_units(a), with_units(b)) for a, b in load(UNITS)]
+    units = load(UNITS)
     for how, folds in (("action units", units), ("measures", load(MEASURES))):
         clips = CLIPS.changed(normalise="range")
         right = judged_labels(side_by_side(learnt_labels, given(folds), clips))
@@ -360,15 +346,6 @@ def lse(here: Real, others: Real | None) -> list[Row]:
     how = "boosting on action units and head"
     rows.append(Row("LSE", "found in sentences", how, judged_sentences(found, labels)))
     return rows
-
-
-def with_units(examples: list[Example]) -> list[Example]:
-    """The examples with the intensities of action units alone."""
-    units = [name for name in examples[0].descriptors.names if name.endswith("_r")]
-    return [
-        replace(e, descriptors=e.descriptors.on(units), level=None if e.level is None else e.level.on(units))
-        for e in examples
-    ]
 
 
 def main() -> None:

@@ -19,9 +19,13 @@ from signface.head import head_angles
 
 #: Window over which angles are smoothed before their turning points are sought (s).
 SMOOTHING_S = 0.1
+#: How long the beginning of a take is (s).
+BEGINNING_S = 0.3
 
 
-def head_events(descriptors: Descriptors, rules: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame | None:
+def head_events(
+    descriptors: Descriptors, rules: Mapping[str, Mapping[str, Any]], *, signer_known: bool = False
+) -> pd.DataFrame | None:
     """Events of the head channel.
 
     Parameters
@@ -29,7 +33,11 @@ def head_events(descriptors: Descriptors, rules: Mapping[str, Mapping[str, Any]]
     descriptors : Descriptors
     rules : mapping
         Value and its thresholds: a movement has `angle, min_swing_deg, max_swing_ms, min_swings`, a posture
-        `angle, sign, on_deg, off_deg, min_ms`.
+        `angle, sign, on_deg, off_deg, min_ms`. A posture may have `beginning`, a share of the angle at the beginning of
+        the take that is taken off: half of how a take begins is how the signer sits today. One with `signer = true`
+        is sought only where it is known how the signer holds the head; a table `signer` replaces thresholds there.
+    signer_known : bool
+        Whether angles are measured from the signer's rest over all their takes.
 
     Returns
     -------
@@ -40,6 +48,10 @@ def head_events(descriptors: Descriptors, rules: Mapping[str, Mapping[str, Any]]
     angles = head_angles(descriptors)
     if not any(np.nanmax(np.abs(angle), initial=0) > 1e-6 for angle in angles.values()):
         return None
+    if signer_known:
+        rules = {
+            v: {**rule, **rule["signer"]} if isinstance(rule.get("signer"), dict) else rule for v, rule in rules.items()
+        }
     rate = descriptors.rate
     smooth = {name: _smoothed(angle, rate) for name, angle in angles.items()}
     movements = []
@@ -56,18 +68,22 @@ def head_events(descriptors: Descriptors, rules: Mapping[str, Mapping[str, Any]]
             rows.append((start, end, value, cycles, amplitude))
     strength = np.full(descriptors.n_frames, -np.inf)
     posture = np.full(descriptors.n_frames, -1)
-    names = [value for value, rule in rules.items() if "on_deg" in rule]
+    names = [v for v, rule in rules.items() if "on_deg" in rule and (signer_known or not rule.get("signer"))]
     for index, value in enumerate(names):
         rule = rules[value]
-        signal = rule["sign"] * smooth[rule["angle"]]
+        course = _smoothed(angles[rule["angle"]], rate, rule.get("smooth_ms", 1000 * SMOOTHING_S) / 1000)
+        opening = course[: max(1, round(BEGINNING_S * rate))]
+        known = opening[np.isfinite(opening)]
+        taken_off = rule.get("beginning", 0.0) * float(known.mean()) if len(known) else 0.0
+        signal = rule["sign"] * (course - taken_off)
         on = long_enough(hysteresis(signal, rule["on_deg"], rule["off_deg"]) & ~taken, rule["min_ms"] / 1000 * rate)
         stronger = on & (signal / rule["on_deg"] > strength)
         strength[stronger], posture[stronger] = (signal / rule["on_deg"])[stronger], index
     for index, value in enumerate(names):
         on = long_enough(posture == index, rules[value]["min_ms"] / 1000 * rate)
         for start, end in runs(on):
-            angle = float(np.nanmedian(np.abs(smooth[rules[value]["angle"]][start:end])))
-            rows.append((int(start), int(end), value, np.nan, angle))
+            held = float(np.nanmedian(np.abs(smooth[rules[value]["angle"]][start:end])))
+            rows.append((int(start), int(end), value, np.nan, held))
     rows.sort()
     first = descriptors.start
     return pd.DataFrame(
@@ -76,14 +92,14 @@ def head_events(descriptors: Descriptors, rules: Mapping[str, Mapping[str, Any]]
     )
 
 
-def _smoothed(angle: np.ndarray, rate: float) -> np.ndarray:
-    """The angle smoothed over `SMOOTHING_S`; unknown frames are bridged, and NaN again afterwards."""
+def _smoothed(angle: np.ndarray, rate: float, width_s: float = SMOOTHING_S) -> np.ndarray:
+    """The angle smoothed over `width_s`; unknown frames are bridged, and NaN again afterwards."""
     unknown = np.isnan(angle)
     if unknown.all():
         return angle
     frames = np.arange(len(angle))
     whole = np.interp(frames, frames[~unknown], angle[~unknown])
-    window = 2 * round(SMOOTHING_S * rate / 2) + 1
+    window = 2 * round(width_s * rate / 2) + 1
     if 3 < window <= len(whole):
         from scipy.signal import savgol_filter  # slow to import
 

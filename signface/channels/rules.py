@@ -106,7 +106,7 @@ def find_channels(
         if channel == "intensity" or (table.get("measured_only") and solved):
             continue
         if channel == "head":
-            events = head_events(descriptors, dict(_values(table)))
+            events = head_events(descriptors, dict(_values(table)), signer_known=level is not None)
             if events is None:
                 continue
         else:

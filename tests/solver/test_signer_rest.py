@@ -138,5 +138,6 @@ def test_a_real_question_has_raised_brows_where_it_is_annotated(settings_):
         raised |= (value == "br_raise") & (take.time >= begin / 1000) & (take.time < end / 1000)
     assert 0.1 < raised.mean() < 0.9
     brows = take.weight(name)
-    assert np.mean(brows[raised] > np.median(brows[~raised])) > 0.9
+    higher = np.mean(brows[raised][:, None] > brows[~raised])  # of a frame inside and one outside, the one inside
+    assert higher > 0.85
     assert signer.rest.takes == 2

@@ -37,7 +37,8 @@ def _unit_certainty(head: FileHead) -> float:
 def read_action_units(path: str | PathLike[str], *, unit: str | None = None) -> Descriptors:
     """Read the action units of an OpenFace table as weights, and the head's pose where it is there.
 
-    `AU01_r` (0 to 5) is divided by 5, `AU01_c` (there or not) stays 0 or 1. Columns keep OpenFace's names.
+    The intensity `AU01_r` (0 to 5), divided by 5, becomes the weight `AU01`. Whether a unit is there at all (`AU28_c`,
+    0 or 1) stands for units without an intensity.
 
     Parameters
     ----------
@@ -53,18 +54,19 @@ def read_action_units(path: str | PathLike[str], *, unit: str | None = None) -> 
     del unit
     file = Path(path)
     table = read_table(file)
-    names = [name for name in table.columns if _UNIT.fullmatch(name)]
-    if not names:
+    there = [name for name in table.columns if _UNIT.fullmatch(name)]
+    columns = [name for name in there if name.endswith("_r") or f"{name[:4]}_r" not in there]
+    if not columns:
         raise SignfaceError(
             "has neither 3-D landmarks (X_0, ...) nor action units (AU01_r, ...)",
             file=file,
             hint="run OpenFace with -3Dfp or -aus",
         )
-    weights = table.place(names) / [FULL_INTENSITY if name.endswith("_r") else 1.0 for name in names]
+    weights = table.place(columns) / [FULL_INTENSITY if name.endswith("_r") else 1.0 for name in columns]
     present = set(POSE) <= set(table.columns)
     return Descriptors(
         weights,
-        tuple(names),
+        tuple(name[:4] for name in columns),
         table.rate,
         start=table.start,
         head=_poses(table.place(list(POSE))) if present else None,
