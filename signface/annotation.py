@@ -10,7 +10,7 @@ an annotation for ELAN.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -287,7 +287,11 @@ def annotate(
         one if isinstance(one, Clause) else find_clause(_fitting(one, descriptors, recording), one, signer=signer)
         for one in clauses
     )
-    return Annotation(descriptors, segments, model.name, events, signer, model.card, found)
+    taken, named = {model.card.tier, *(events or {})}, []
+    for one in found:
+        named.append(replace(one, tier=f"{one.tier}-{one.model}") if one.tier in taken else one)
+        taken.add(named[-1].tier)
+    return Annotation(descriptors, segments, model.name, events, signer, model.card, tuple(named))
 
 
 def _fitting(model: TrainedModel, descriptors: Descriptors, recording: Recording | Descriptors) -> Any:

@@ -168,7 +168,8 @@ class _Further:
 
     def __init__(self, model: TrainedModel, takes: list[Path], signer: Signer) -> None:
         self.model, self.settings = model, SolveSettings.from_dict(model.card.solve)
-        self.signer, self.known = signer, dict[Path, Descriptors]()
+        self.signer = signer
+        self.known: dict[Path, Descriptors] = {}
         fits = signer.level is not None and set(model.card.bases) <= set(signer.level.names)
         if len(takes) > 1 and model.card.normalise in BY_SIGNER and not fits:
             self.signer, self.known = _of_all(takes, self.settings, replace(signer, level=None), wanted=True)
