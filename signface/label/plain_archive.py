@@ -26,6 +26,7 @@ TREE = "model.json"
 
 #: Models that consist of arrays and plain values, and where they stand.
 MODELS = {
+    "BoostingLabeller": "signface.sequence.boosting",
     "ChainLabeller": "signface.sequence.crf",
     "IntensityClassifier": "signface.label.intensity",
     "RecurrentLabeller": "signface.sequence.gru",

@@ -20,6 +20,7 @@ from signface.segmentation.segments import Segments
 from signface.sequence.course_features import course_features
 from signface.sequence.frame_features import TRANSITION, frame_states
 from signface.sequence.take_labeller import TakeLabeller
+from signface.sequence.tree_arrays import tree_arrays, tree_probabilities
 
 
 class BoostingLabeller(TakeLabeller):
@@ -48,7 +49,8 @@ class BoostingLabeller(TakeLabeller):
     Attributes
     ----------
     classes_ : (A,) array of str
-    trees_ : HistGradientBoostingClassifier
+    trees_ : dict of str to array
+        See `signface.sequence.tree_arrays`.
     n_frames_ : int
         Frames it was trained on.
     """
@@ -118,7 +120,7 @@ class BoostingLabeller(TakeLabeller):
         worth: dict[str, float] = dict(
             zip(self.classes_, (len(state) / counts / len(counts)) ** self.balance, strict=True)
         )
-        self.trees_ = HistGradientBoostingClassifier(
+        trees = HistGradientBoostingClassifier(
             max_iter=self.iterations,
             learning_rate=self.rate,
             max_leaf_nodes=self.leaves,
@@ -128,12 +130,14 @@ class BoostingLabeller(TakeLabeller):
             early_stopping=False,
             random_state=self.seed,
         ).fit(np.concatenate(features), state, sample_weight=np.array([worth[label] for label in state]))
+        self.trees_ = tree_arrays(trees)
         self.n_frames_ = len(state)
         return self
 
     def frame_probabilities(self, take: Descriptors) -> np.ndarray:
         """(K, A + 1) probability of each of `classes_`, and of a transition, which there is none."""
-        probability = self.trees_.predict_proba(course_features(take.on(self.bases_), self.frame_times(take)))
+        features = course_features(take.on(self.bases_), self.frame_times(take))
+        probability = tree_probabilities(self.trees_, features)
         return np.column_stack([probability, np.zeros(len(probability))])
 
     def find(self, take: Descriptors) -> tuple[np.ndarray, list[tuple[int, int, int]]]:

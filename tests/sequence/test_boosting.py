@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
 from itertools import pairwise, product
 
 import numpy as np
@@ -9,12 +11,15 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sklearn.ensemble import HistGradientBoostingClassifier
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
+from signface.label.plain_archive import plain_entries, read_plain
 from signface.segmentation.segments import Segments
 from signface.sequence.boosting import BoostingLabeller, likeliest_path
 from signface.sequence.course_features import course_features, width
+from signface.sequence.tree_arrays import tree_arrays, tree_probabilities
 
 
 def sentence(seed: int, seconds: float = 6.0) -> tuple[Descriptors, Segments]:
@@ -94,3 +99,25 @@ def test_a_constant_has_no_slope_swing_or_range():
     features = course_features(still, np.array([1.0]))[0]
     np.testing.assert_allclose(features[:6], 0.3, atol=1e-6)
     np.testing.assert_allclose(features[6:11], 0.0, atol=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("labels", [2, 3])
+def test_trees_as_arrays_are_those_of_scikit_learn(labels):
+    rng = np.random.default_rng(labels)
+    features = rng.normal(size=(400, 6)).astype(np.float32)
+    truth = np.digitize(features[:, 1] + features[:, 4] ** 2, [0.5, 2.0][: labels - 1])
+    trees = HistGradientBoostingClassifier(max_iter=20, max_leaf_nodes=8, random_state=0).fit(features, truth)
+    again = tree_probabilities(tree_arrays(trees), features)
+    np.testing.assert_allclose(again, trees.predict_proba(features), atol=1e-12)
+
+
+@pytest.mark.slow
+def test_a_model_is_kept_as_plain_arrays(model):
+    with zipfile.ZipFile(io.BytesIO(), "w") as archive:
+        for name, content in plain_entries({"labels": model}).items():
+            archive.writestr(name, content)
+        again = read_plain(archive)["labels"]
+    take, _ = sentence(61)
+    np.testing.assert_array_equal(again.frame_probabilities(take), model.frame_probabilities(take))
+    assert again.annotate(take) == model.annotate(take)
