@@ -166,7 +166,8 @@ def read_corpus(path: str | PathLike[str]) -> Corpus:
     Raises
     ------
     SignfaceError
-        There is no manifest and none can be made, it is no table, or some of its rows are wrong; the message lists every problem.
+        There is no manifest and none can be made, it is no table, or some of its rows are wrong; the message lists
+        every problem.
 
     Examples
     --------
@@ -209,7 +210,8 @@ def _make_manifest(folder: Path) -> None:
     strangers = sum(one.signer == UNKNOWN for one in found)
     unknown = f"; the signer of {counted(strangers, 'take')} is not known: fill in its column signer" * bool(strangers)
     warnings.warn(
-        f"{folder}: had no {MANIFEST}; a table of {counted(len(found), 'take')} was written from the names of files{unknown}",
+        f"{folder}: had no {MANIFEST}; one that lists {counted(len(found), 'take')} was written from the names of files"
+        + unknown,
         SignfaceWarning,
         stacklevel=4,
     )

@@ -1,8 +1,8 @@
 """Labels of single frames as an annotation: the `*_targets.txt` of UCI's Grammatical Facial Expressions.
 
-Beside `a_affirmative_datapoints.txt`, whose rows have times, lies `a_affirmative_targets.txt`: a line a row, 1 where the
-expression of the file's name is shown, 0 elsewhere. Rows of 1 that follow each other are one annotation on the tier
-`expression`, with the name as its value; it begins and ends half way to the rows beside it.
+Beside `a_affirmative_datapoints.txt`, whose rows have times, lies `a_affirmative_targets.txt`: a line a row, 1 where
+the expression of the file's name is shown, 0 elsewhere. Rows of 1 that follow each other are one annotation on the
+tier `expression`, with the name as its value; it begins and ends half way to the rows beside it.
 
 - `is_frame_labels`: whether a file is one of these.
 - `frame_label_document`: it as the document of an EAF, for all that reads annotations.
