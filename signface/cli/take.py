@@ -69,6 +69,7 @@ def _report(file: str, content: dict[str, Any]) -> str:
             lines.append(f"  layout: none of the shipped ones ({content['note']})")
         else:
             lines.append(f"  layout: {content['layout']}, {content['face_markers']} face markers")
+            lines += [f"  but it {content['note']}"] if "note" in content else []
             lines.append(f"  head markers: {_shortened(content['head_markers']) or 'none'}")
             if content["missing"]:
                 lines.append(f"  not in the take: {_shortened(content['missing'])}")

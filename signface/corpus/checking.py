@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from signface.corpus.cluster import WorkerDied, on_cores
-from signface.corpus.describing import layout_for, read_entry, recipe_of
+from signface.corpus.describing import face_for, layout_for, read_entry, recipe_of
 from signface.corpus.manifest import TakeEntry, find_manifest, read_rows
 from signface.corpus.origin import Recipe, content_digest, make_recipe, take_name
 from signface.descriptors import Descriptors
@@ -212,11 +212,16 @@ def check_take(check: TakeCheck) -> CheckedTake:
 
 def _problems_of_markers(entry: TakeEntry, recipe: Recipe, take: Take) -> list[str]:
     """Whether the markers are those of the layout."""
+    from signface.solver.layout_fit import check_take as check_fit_of
     from signface.takes.labels import rename_to
 
     layout = layout_for(recipe, take.labels)
     try:
         labels = rename_to(take, layout.labels).labels
+    except SignfaceError as error:
+        return [str(error.at(entry.path))]
+    try:
+        check_fit_of(take, layout, face_for(recipe))
     except SignfaceError as error:
         return [str(error.at(entry.path))]
     heads = [label for label in layout.head_labels if label in labels]

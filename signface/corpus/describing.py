@@ -2,7 +2,7 @@
 
 - `describe_entry`: solve a row of `takes.csv`.
 - `stored_or_solved`: the same, but only when the store does not have it.
-- `read_entry`, `recipe_of`, `layout_for`: the recording, recipe and layout of a row.
+- `read_entry`, `recipe_of`, `layout_for`, `face_for`: the recording, recipe, layout and face of a row.
 
 Faces and layouts are read once in a process and used for as many takes as there are.
 """
@@ -110,6 +110,17 @@ def _face(name: str, digest: str) -> FaceModel:
     if content_digest(path) != digest:
         raise SignfaceError("is not the face that the run began with", file=path, hint="run again")
     return read_face(name)
+
+
+def face_for(recipe: Recipe) -> FaceModel:
+    """The face of a recipe.
+
+    Raises
+    ------
+    SignfaceError
+        Its file was changed since the recipe was made.
+    """
+    return _face((SolveSettings() if recipe.settings is None else recipe.settings).face, recipe.face_digest)
 
 
 @lru_cache(maxsize=16)

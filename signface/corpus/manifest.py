@@ -1,6 +1,7 @@
 """The manifest of a corpus: `takes.csv`, one row a take.
 
-- `read_corpus`: read and validate it; every problem is reported at once.
+- `read_corpus`: read and validate it; every problem is reported at once. A folder of recordings that needs none said
+  about it (`signface.corpus.found`) gets one.
 - `write_takes`: write it, for whoever makes a corpus.
 - `TakeEntry`, `Corpus`: a row, and all of them with filters by kind and by signer.
 
@@ -13,12 +14,14 @@ from __future__ import annotations
 import csv
 import difflib
 import math
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
-from signface.errors import SignfaceError, counted
+from signface.corpus.found import UNKNOWN, found_takes
+from signface.errors import SignfaceError, SignfaceWarning, counted
 from signface.files import whole_file
 
 MANIFEST = "takes.csv"
@@ -157,12 +160,14 @@ def read_corpus(path: str | PathLike[str]) -> Corpus:
     Parameters
     ----------
     path : path
-        The folder of the corpus or its `takes.csv`.
+        The folder of the corpus or its `takes.csv`. Where a folder has none and holds recordings whose names say
+        enough (`signface.corpus.found`), it is written, with a `SignfaceWarning`.
 
     Raises
     ------
     SignfaceError
-        There is no manifest, it is no table, or some of its rows are wrong; the message lists every problem.
+        There is no manifest and none can be made, it is no table, or some of its rows are wrong; the message lists
+        every problem.
 
     Examples
     --------
@@ -181,15 +186,35 @@ def read_corpus(path: str | PathLike[str]) -> Corpus:
 
 
 def find_manifest(path: str | PathLike[str]) -> Path:
-    """The `takes.csv` of a corpus, from the path of its folder or of the file itself."""
+    """The `takes.csv` of a corpus, from the path of its folder or of the file itself; made where it can be."""
     file = Path(path)
     if not file.is_dir():
         if not file.exists() and file.suffix.lower() != ".csv":
             raise SignfaceError("no such folder", file=path, hint="name the folder of a corpus")
         return file
     if not (file / MANIFEST).is_file():
-        raise SignfaceError(f"has no {MANIFEST}", file=path, hint="name the folder of a corpus")
+        _make_manifest(file)
     return file / MANIFEST
+
+
+def _make_manifest(folder: Path) -> None:
+    """Write `takes.csv` from what the names of files say, and say so."""
+    found = found_takes(folder)
+    if not found:
+        raise SignfaceError(
+            f"has no {MANIFEST}",
+            file=folder,
+            hint=f"name the folder of a corpus, or write one: its columns are {', '.join(REQUIRED + OPTIONAL)}",
+        )
+    write_takes(folder, [TakeEntry(one.path, one.signer, one.kind, one.annotation) for one in found])
+    strangers = sum(one.signer == UNKNOWN for one in found)
+    unknown = f"; the signer of {counted(strangers, 'take')} is not known: fill in its column signer" * bool(strangers)
+    warnings.warn(
+        f"{folder}: had no {MANIFEST}; one that lists {counted(len(found), 'take')} was written from the names of files"
+        + unknown,
+        SignfaceWarning,
+        stacklevel=4,
+    )
 
 
 def read_rows(file: Path) -> tuple[list[TakeEntry], list[str]]:

@@ -21,6 +21,7 @@ from lxml import etree
 
 from signface.elan.checking import check_document
 from signface.elan.document import CHANNEL_PREFIX, Row, read_document, recorded, tier_rows
+from signface.elan.frame_labels import frame_label_document, is_frame_labels
 from signface.elan.tiers import clean_name, tier_name
 from signface.elan.vocabularies import vocabulary_of_tier
 from signface.errors import SignfaceError, SignfaceWarning
@@ -36,7 +37,7 @@ def read_reference(
     Parameters
     ----------
     eaf : path
-        An EAF, format 2.5 to 3.0.
+        An EAF, format 2.5 to 3.0, or labels of single frames (`signface.elan.frame_labels`).
     signer : str, optional
         Whose tier: `TIER@SIGNER`, else `TIER`, else the lab's tier that signface wrote the signer's affect to. When
         not given, `TIER` or the only such tier.
@@ -78,7 +79,7 @@ def read_reference(
     4    5.160  5.922      stable     N       <NA>
     """
     file = Path(eaf)
-    root = read_document(file).getroot()
+    root = _root(file)
     name = _tier_name(root, tier, signer, file)
     _fill_times(root)
     tiers = tier_rows(root)
@@ -122,7 +123,7 @@ def reference_vocabulary(files: Sequence[tuple[str | PathLike[str], str | None]]
     labels: dict[str, list[Path]] = {}
     for eaf, signer in files:
         file = Path(eaf)
-        root = read_document(file).getroot()
+        root = _root(file)
         name = _tier_name(root, tier, signer, file)
         vocabulary = vocabulary_of_tier(root, name, file)
         closed += [] if vocabulary is None else [vocabulary]
@@ -164,7 +165,7 @@ def read_tiers(eaf: str | PathLike[str]) -> dict[str, pd.DataFrame]:
     affect@M2 5
     """
     file = Path(eaf)
-    root = read_document(file).getroot()
+    root = _root(file)
     check_document(root, file)
     _fill_times(root)
     rows = tier_rows(root)
@@ -191,7 +192,7 @@ def read_corrections(
     those of `read_reference`.
     """
     file = Path(eaf)
-    root = read_document(file).getroot()
+    root = _root(file)
     name = _tier_name(root, tier, signer, file)
     written = recorded(root).get(name)
     if written is None:
@@ -226,6 +227,11 @@ def channel_labels(root: etree._Element) -> dict[str, tuple[str, dict[str, str]]
         except (ValueError, KeyError, TypeError, AttributeError):
             continue  # edited by someone: the tier is then read as any other
     return labels_of
+
+
+def _root(file: Path) -> etree._Element:
+    """The document of an annotation, whichever file holds it."""
+    return frame_label_document(file) if is_frame_labels(file) else read_document(file).getroot()
 
 
 def _table(rows: Iterable[Row]) -> pd.DataFrame:

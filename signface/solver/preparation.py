@@ -23,6 +23,7 @@ from signface.solver.adaptation import MorphologicalAdaptation, SimilarityAdapta
 from signface.solver.base import Solution
 from signface.solver.creep import Creep
 from signface.solver.displacements import Displacements, neutral_places
+from signface.solver.layout_fit import check_fit
 from signface.solver.resting import resting_time
 from signface.takes.cleaning import Kept, Progress, cleaning_stages, silently
 from signface.takes.recording import PIECE, Recording
@@ -102,11 +103,15 @@ class Preparation:
         glance = clean.glance(VIEW_FRAMES, piece=piece, progress=progress)
         time, seen, places = self._neutral(glance, face, layout, labels, settings, rest)
         self.neutral_s = time
+        target = layout.points(face, seen)
+        try:
+            check_fit(places, target, layout.name, seen)
+        except SignfaceError as error:
+            raise error.at(clean.name) from error
         self.layout = layout.restricted([*seen, *head])
         bases = None if signer is None else signer.bases
         self.signer_bases = None if bases is None else bases.at(face, self.layout)
         view = View(clean, Block(glance.positions, range(clean.n_frames)[:: round(clean.rate / glance.rate)]))
-        target = layout.points(face, seen)
         aligned = known = None
         if rest is not None:
             onto = rigid_transform(places, target)[None]

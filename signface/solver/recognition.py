@@ -7,6 +7,7 @@ from typing import Any
 from signface.errors import SignfaceError
 from signface.face.layout_files import choose_layout
 from signface.face.model import FaceModel
+from signface.solver.layout_fit import check_take
 from signface.takes.labels import match_labels
 from signface.takes.take import Take
 
@@ -18,7 +19,8 @@ def recognise_layout(take: Take, face: FaceModel) -> dict[str, Any]:
     -------
     dict
         `layout` (its name, or None where none fits, and then a `note` why), `face_markers` (how many of them the take
-        has), `head_markers` (which), `missing` (markers of the layout that the take has not).
+        has), `head_markers` (which), `missing` (markers of the layout that the take has not). A `note` beside a layout
+        says that the markers do not lie where it says.
 
     Examples
     --------
@@ -31,7 +33,13 @@ def recognise_layout(take: Take, face: FaceModel) -> dict[str, Any]:
     except SignfaceError as error:
         return {"layout": None, "face_markers": 0, "head_markers": [], "missing": [], "note": error.problem}
     present = match_labels(take.labels, layout.labels)
+    try:
+        check_take(take, layout, face)
+        notes = {}
+    except SignfaceError as error:
+        notes = {"note": f"{error.problem}. {(error.hint or '')[:1].upper()}{(error.hint or '')[1:]}"}
     return {
+        **notes,
         "layout": layout.name,
         "face_markers": sum(1 for label in layout.face_labels if label in present),
         "head_markers": [label for label in layout.head_labels if label in present],

@@ -33,7 +33,7 @@ from signface.takes.take import Take
 #: The modules of this folder that declare a format, in the order in which formats are listed.
 SHIPPED = tuple(
     f"signface.takes.formats.{name}"
-    for name in ("c3d", "trc", "qtm", "table", "pose", "livelink", "openface", "openface_units", "weights")
+    for name in ["c3d", "trc", "qtm", "table", "pose", "livelink", "openface", "openface_units", "kinect", "weights"]
 )
 
 #: The group of entry points by which installed packages bring formats.
