@@ -1,10 +1,12 @@
 """How well real signers are annotated: `python -m benchmarks.real FOLDER`.
 
 FOLDER holds corpora of OpenFace recordings with human annotations, each a folder with a `takes.csv`: `krsl` (tiers
-brows and head), `lse` (tier CNM_tipo), `buhmap` (tier movement); those that are not there are passed over. Every
-person is annotated by what was learnt of the others (leave one signer out); with `--others FOLDER` the persons of the
-second folder are, by what was learnt of all in the first. Nothing is chosen on the persons that are judged, but where
-the table says so. Intervals (95 %) are drawn over signers, 2,000 times.
+brows and head), `lse` (tier CNM_tipo), `buhmap` (tier movement), and `gfe`, the files of UCI's Grammatical Facial
+Expressions; those that are not there are passed over.
+
+Every person is annotated by what was learnt of the others (leave one signer out); with `--others FOLDER` the persons
+of the second folder are, by what was learnt of all in the first. Nothing is chosen on the persons that are judged,
+but where the table says so. Intervals (95 %) are drawn over signers, 2,000 times.
 
 A signer's rest and level come from all of their recordings and no annotation; the takes of one person are never on
 both sides.
@@ -15,18 +17,21 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shutil
 import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
 
+from benchmarks.real_scores import DRAWS, FRAME_S, interval, judged_labels, judged_sentences, macro_f1, value_codes
 from signface.channels.rules import find_channels
 from signface.corpus.examples import solve_corpus
 from signface.corpus.levels import learn_signers
@@ -38,14 +43,12 @@ from signface.label.vocabulary import NONE, Vocabulary
 from signface.learn.examples import Example
 from signface.learn.fitting import fit_model
 from signface.learn.restriction import restricted
-from signface.metrics.agreement import match_annotations
 from signface.metrics.bootstrap import cluster_draws
 from signface.segmentation.segments import Segments
 from signface.settings.solve import SolveSettings
 from signface.settings.training import TrainingSettings
 
 WEIGHTS, MEASURES, UNITS = SolveSettings(), SolveSettings(method="measures"), SolveSettings(read_as="aus")
-FRAME_S, DRAWS = 0.04, 2000
 SENTENCES = TrainingSettings(classifier="boosting", features=("weights", "head"), normalise="range")
 CLIPS = TrainingSettings(
     classifier="extra-trees",
@@ -84,7 +87,7 @@ class Real:
         self.folders: dict[str, Path] = {}
         for source in sorted(folder.iterdir()):
             for place in (source, source / source.name):
-                if (place / "takes.csv").is_file():
+                if place.is_dir() and ((place / "takes.csv").is_file() or any(place.glob("*_datapoints.txt"))):
                     self.folders[source.name] = place
         self.work = work
 
@@ -94,7 +97,8 @@ class Real:
         if not place.is_dir():
             place.mkdir(parents=True)
             for file in self.folders[corpus].iterdir():
-                (place / file.name).symlink_to(file.resolve())
+                if file.is_file():
+                    shutil.copyfile(file, place / file.name)
             for signer in learn_signers(read_corpus(place), settings):
                 (place / "signers").mkdir(exist_ok=True)
                 signer.save(place / "signers" / f"{signer.name}.json")
@@ -131,75 +135,6 @@ def side_by_side(work: Callable[..., list], folds: list[Fold], *more: object) ->
     """All folds on the cores of this machine."""
     parts = Parallel(n_jobs=min(2, len(folds)))(delayed(work)(fold, *more) for fold in folds)
     return [row for part in parts for row in part]
-
-
-def judged_sentences(found: list[tuple[Example, pd.DataFrame]], labels: Sequence[str]) -> dict:
-    """Kappa and F1 of frames, F1 of segments, false alarms in takes without any, with intervals over signers."""
-    order = [NONE, *labels]
-    signers = sorted({example.signer for example, _ in found})
-    counts = np.zeros((len(signers), len(order), len(order)))
-    segments, alarms = np.zeros((len(signers), 3)), np.zeros((len(signers), 2))
-    for example, table in found:
-        row = signers.index(example.signer)
-        times = np.arange(
-            example.descriptors.start + FRAME_S / 2, example.descriptors.start + example.descriptors.duration, FRAME_S
-        )
-        truth, said = (value_codes(t, times, order) for t in (example.reference.table, table))
-        np.add.at(counts[row], (truth[truth >= 0], np.maximum(said, 0)[truth >= 0]), 1)
-        true, hit = (t[t["label"].isin(labels)] for t in (example.reference.table, table))
-        for label in labels:
-            a, b = (t[t["label"] == label].reset_index(drop=True) for t in (true, hit))
-            segments[row] += (len(match_annotations(a, b, overlap=0.5)), len(a), len(b))
-        if not len(true):
-            alarms[row] += (len(hit) > 0, 1)
-    times = np.concatenate([np.ones((1, len(signers))), cluster_draws(len(signers), DRAWS)])
-    drawn = np.einsum("ds,sij->dij", times, counts)
-    parts, alarm = times @ segments, times @ alarms
-    with np.errstate(invalid="ignore", divide="ignore"):
-        values = {
-            "kappa": kappas(drawn),
-            "F1 frames": macro_f1(drawn),
-            "F1 segments": 2 * parts[:, 0] / (parts[:, 1] + parts[:, 2]),
-            "false alarms": alarm[:, 0] / alarm[:, 1],
-        }
-    return {name: interval(value) for name, value in values.items() if np.isfinite(value[0])}
-
-
-def value_codes(table: pd.DataFrame, times: np.ndarray, order: list[str]) -> np.ndarray:
-    """(K,) place in `order` of what a table says at each time; -1 where it says nothing."""
-    codes = np.full(len(times), -1)
-    for start, end, label in table[["start_s", "end_s", "label"]].itertuples(index=False):
-        codes[(times >= start) & (times < end)] = order.index(label) if label in order else 0
-    return codes
-
-
-def kappas(counts: np.ndarray) -> np.ndarray:
-    """(D,) Cohen's kappa of (D, L, L) counts."""
-    total = counts.sum(axis=(1, 2))
-    agreed = np.trace(counts, axis1=1, axis2=2) / total
-    chance = (counts.sum(axis=1) * counts.sum(axis=2)).sum(axis=1) / total**2
-    return (agreed - chance) / (1 - chance)
-
-
-def macro_f1(counts: np.ndarray) -> np.ndarray:
-    """(D,) mean F1 over all labels but the first."""
-    hit = np.diagonal(counts, axis1=1, axis2=2)[:, 1:]
-    return (2 * hit / (counts.sum(axis=1) + counts.sum(axis=2))[:, 1:]).mean(axis=1)
-
-
-def judged_labels(rows: list[tuple[str, str, str]]) -> dict:
-    """Share of right labels, with its interval over signers."""
-    signers = sorted({signer for signer, *_ in rows})
-    right = np.array([sum(s == name and t == f for s, t, f in rows) for name in signers])
-    total = np.array([sum(s == name for s, *_ in rows) for name in signers])
-    times = np.concatenate([np.ones((1, len(signers))), cluster_draws(len(signers), DRAWS)])
-    return {"right": interval((times @ right) / (times @ total)), "of": (float(total.sum()),) * 3}
-
-
-def interval(values: np.ndarray) -> tuple[float, float, float]:
-    """The value, and the ends of the middle 95 % of those drawn."""
-    low, high = np.nanquantile(values[1:], [0.025, 0.975])
-    return float(values[0]), float(low), float(high)
 
 
 def by_rule(examples: list[Example], channel: str, names: dict[str, str], levels: bool) -> list:
@@ -348,12 +283,66 @@ def lse(here: Real, others: Real | None) -> list[Row]:
     return rows
 
 
+#: Phrases of an expression are cut into so many parts, one of which is left out at a time.
+PARTS = 5
+#: The recordings are short: every frame is learnt from. Written down before any was judged.
+SHORT = SENTENCES.changed(parameters={"every": 1, "smallest": 10})
+
+
+def parts_of(example: Example, expression: str) -> list[Example]:
+    """The take cut between phrases, `PARTS` parts of as many phrases each."""
+    shown = example.stable[example.stable["label"] == expression]
+    ends, begins = shown["end_s"].to_numpy(float), shown["start_s"].to_numpy(float)
+    limits = [round(len(shown) * part / PARTS) for part in range(1, PARTS)]
+    take = example.descriptors
+    cuts = [take.start, *((ends[i - 1] + begins[i]) / 2 for i in limits), take.start + take.duration]
+    parts = []
+    for low, high in pairwise(cuts):
+        table = example.stable.copy()
+        table["start_s"], table["end_s"] = table["start_s"].clip(low, high), table["end_s"].clip(low, high)
+        table = table[table["end_s"] > table["start_s"] + 1e-6].reset_index(drop=True)
+        cut = replace(example, descriptors=take.between(low, high), reference=Segments(table, name=example.take))
+        parts.append(replace(cut, take=f"{example.take} {low:.0f}"))
+    return parts
+
+
+def gfe(here: Real, others: Real | None) -> list[Row]:
+    """Grammatical expressions in Libras, one a recording: F of frames."""
+    rows, total = [], []
+    judged = None if others is None else others.examples("gfe", MEASURES, "expression")
+    for example in here.examples("gfe", MEASURES, "expression"):
+        name = example.kind
+        (mine,) = restricted([example], [name])
+        if judged is None:
+            parts = parts_of(mine, name)
+            folds = [([p for p in parts if p is not part], [part]) for part in parts]
+        else:
+            folds = [([mine], restricted([e for e in judged if e.kind == name], [name]))]
+        found = side_by_side(learnt_segments, folds, SHORT)
+        counts = np.zeros((len(found), 2, 2))
+        for row, (part, table) in enumerate(found):
+            take = part.descriptors
+            times = np.arange(take.start + FRAME_S / 2, take.start + take.duration, FRAME_S)
+            truth, said = (value_codes(t, times, [NONE, name]) for t in (part.reference.table, table))
+            np.add.at(counts[row], (truth[truth >= 0], np.maximum(said, 0)[truth >= 0]), 1)
+        times = np.concatenate([np.ones((1, len(found))), cluster_draws(len(found), DRAWS)])
+        value = interval(macro_f1(np.einsum("ds,sij->dij", times, counts)))
+        total.append(value[0])
+        rows.append(Row("GFE", name, "boosting on measures and head", {"F frames": value}))
+    mean = float(np.mean(total))
+    how = "fifths of the phrases of signer a left out" if judged is None else "other signers"
+    return [*rows, Row("GFE", f"mean of {len(rows)} expressions", how, {"F frames": (mean, mean, mean)})]
+
+
+NAMES = ("krsl", "lse", "buhmap", "gfe")
+
+
 def main() -> None:
     """Judge every corpus that is there, and print one table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path, help="folder of corpora: krsl, lse, buhmap")
+    parser.add_argument("folder", type=Path, help="folder of corpora: krsl, lse, buhmap, gfe")
     parser.add_argument("--others", type=Path, help="the same corpora of other persons, to be judged instead")
-    parser.add_argument("--only", nargs="+", choices=("krsl", "lse", "buhmap"), default=("krsl", "lse", "buhmap"))
+    parser.add_argument("--only", nargs="+", choices=NAMES, default=NAMES)
     parser.add_argument("-o", "--output", type=Path, help="a .json of the same numbers")
     arguments = parser.parse_args()
     os.environ["OMP_NUM_THREADS"] = "1"
@@ -362,7 +351,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as work:
         here = Real(arguments.folder, Path(work) / "here")
         others = None if arguments.others is None else Real(arguments.others, Path(work) / "others")
-        for judge in (krsl, lse, buhmap):
+        for judge in (krsl, lse, buhmap, gfe):
             name = judge.__name__
             if name not in here.folders or name not in arguments.only:
                 continue
@@ -372,7 +361,7 @@ def main() -> None:
             rows += judge(here, others)
             print(f"{name}: {time.perf_counter() - start:.0f} s", file=sys.stderr, flush=True)
     if not rows:
-        raise SystemExit(f"{arguments.folder} holds none of krsl, lse and buhmap, each with a takes.csv")
+        raise SystemExit(f"{arguments.folder} holds none of {', '.join(NAMES)}")
     table = [["corpus", "what", "how", "value (95 % over signers)"], ["---"] * 4, *(row.cells() for row in rows)]
     print("\n".join(f"| {' | '.join(cells)} |" for cells in table))
     if arguments.output is not None:
