@@ -25,9 +25,10 @@ FLATTEST = 1.0
 #: Noisy recordings get a greater one: twice the typical distance.
 SLIP_MM = 0.5
 
-#: A head marker has slipped where, in the worst tenth of the frames, it is farther than this (mm) from where the others
-#: place it, and than this many times the distance usual among them: trackers of pictures are millimetres off as the head
-#: turns, with all landmarks alike. (Of 62 takes of real signers 4 times the median distance named some in 36, this in 5.)
+#: A head marker has slipped where, in the worst tenth of the frames, it is farther than this (mm) from where the
+#: others place it, and than this many times the distance usual among them: trackers of pictures are millimetres off as
+#: the head turns, with all landmarks alike. (Four times the median distance, without regard to that, named some in 36
+#: of 62 takes of real signers, this in 5.)
 SLIPPED_MM, SLIPPED = 2.0, 3.0
 
 #: Poses are interpolated over at most this long without enough head markers, in seconds.
