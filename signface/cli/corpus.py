@@ -29,6 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
     check = actions.add_parser("check", help="find every problem of a corpus at once")
     _add_corpus(check)
+    check.add_argument("--all", action="store_true", help="tell equal problems of several takes one by one")
     _add_workers(check)
     add_tier_arguments(check)
     add_solve_arguments(check)
@@ -85,8 +86,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def check(arguments: argparse.Namespace) -> int:
-    """Print every problem on a line of its own."""
-    from signface.corpus.checking import check_corpus
+    """Print every problem, equal ones on one line."""
+    from signface.corpus.checking import check_corpus, grouped
 
     found = check_corpus(
         arguments.corpus,
@@ -95,7 +96,7 @@ def check(arguments: argparse.Namespace) -> int:
         workers=arguments.workers,
         progress=lambda items, total: progress(items, "checking", total=total),
     )
-    for problem in found.problems:
+    for problem in found.problems if arguments.all else grouped(found.problems):
         print(f"signface: {problem}", file=sys.stderr)
     count = len(found.problems)
     print(f"{found.summary}: {counted(count, 'problem') if count else 'no problem'}")

@@ -74,7 +74,7 @@ def _check(arguments: argparse.Namespace) -> None:
     for first, second, cosine in report.alike:
         print(f"nearly the same at the markers: {first} and {second} (cosine {cosine:.3f})")
     if len(layout.head_labels) < 3:
-        print("fewer than 3 head markers: head motion will be taken from the least-moving face markers")
+        print("fewer than 3 head markers: solve with --head-fallback least-moving")
 
 
 def _suggest(arguments: argparse.Namespace) -> None:
@@ -83,14 +83,19 @@ def _suggest(arguments: argparse.Namespace) -> None:
     from signface.face.suggestion import suggest_layout
     from signface.takes.neutral import find_neutral
     from signface.takes.reading import read_take
+    from signface.takes.rigid_markers import with_head_markers
 
     face = read_face(arguments.face)
     take = read_take(arguments.take, unit=arguments.unit)
     seconds = find_neutral(take) if arguments.neutral is None else arguments.neutral
     found = suggest_layout(take.labels, take.positions[take.frame_at(seconds)], face)
-    write_layout(found.layout, arguments.output, face)
-    face_markers, head_markers = found.layout.face_labels, found.layout.head_labels
-    print(f"{arguments.output}: {len(face_markers)} face markers, {len(head_markers)} head markers")
+    layout = with_head_markers(found.layout, take, seconds, face)
+    write_layout(layout, arguments.output, face)
+    print(f"{arguments.output}: {len(layout.face_labels)} face markers, {len(layout.head_labels)} head markers")
+    if len(layout.head_labels) < 3:
+        print("fewer than 3 head markers: mark some in the column role, or solve with --head-fallback least-moving")
+    elif layout != found.layout:
+        print(f"the head is carried by what moves least and stands apart: {', '.join(layout.head_labels)}")
     print(
         f"neutral frame at {seconds:.3f} s; the face is {found.scale:.2f} times the signer's; "
         f"markers lay {np.median(found.distance):.1f} mm from it (median)"

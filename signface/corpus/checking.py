@@ -2,6 +2,7 @@
 
 - `check_corpus`: every problem of a corpus, and a line that sums the corpus up.
 - `check_take`: those of one take: its recording, its markers, its reference annotation.
+- `grouped`: equal problems of many takes as one.
 
 Each problem is a line that names the file, what is wrong and what to do.
 """
@@ -9,6 +10,7 @@ Each problem is a line that names the file, what is wrong and what to do.
 from __future__ import annotations
 
 import os
+import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -159,6 +161,31 @@ def check_corpus(
     )
     # An annotation that two takes share is looked at twice.
     return CheckedCorpus(tuple(dict.fromkeys(problems)), summary)
+
+
+def grouped(problems: Iterable[str], fewest: int = 3) -> list[str]:
+    """Problems with those that are equal but for the file and the numbers in them told once, with their number.
+
+    Parameters
+    ----------
+    problems : iterable of str
+        Lines that open with the path of a file.
+    fewest : int
+        So many equal problems are told as one.
+
+    Examples
+    --------
+    >>> grouped([f"lab/{name}.csv: has 2 of the 6 head markers, 3 are needed" for name in ("a", "b", "c")])
+    ['in 3 files, first lab/a.csv: has 2 of the 6 head markers, 3 are needed']
+    """
+    alike: dict[str, list[str]] = defaultdict(list)
+    for problem in problems:
+        path, _, what = problem.partition(": ")
+        alike[re.sub(r"\d+", "0", what.replace(Path(path).stem, ""))].append(problem)
+    lines = []
+    for same in alike.values():
+        lines += same if len(same) < fewest else [f"in {len(same)} files, first {same[0]}"]
+    return lines
 
 
 def _problems_of_names(file: Path, entries: list[TakeEntry]) -> list[str]:
