@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
+import warnings
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -21,7 +23,7 @@ from signface.cli.options import (
     signer_from,
 )
 from signface.cli.threads import one_thread_for_matrices
-from signface.errors import SignfaceError
+from signface.errors import SignfaceError, SignfaceWarning
 from signface.progress import progress
 from signface.settings.choices import BY_SIGNER
 from signface.settings.eaf import EafOptions
@@ -100,6 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
 
         channels = read_channels(options.channels)
     signer, settings = signer_from(arguments), settings_from(arguments, SolveSettings)
+    _warn_of_affect(takes, arguments.classifier)
     _import_shared()
     failed = 0
     with ThreadPoolExecutor(1) as beside:
@@ -133,6 +136,23 @@ def run(arguments: argparse.Namespace) -> int:
     if failed:
         print(f"signface: {failed} of {len(takes)} takes could not be annotated", file=sys.stderr)
     return 2 if failed else 0
+
+
+def _warn_of_affect(takes: list[Path], classifier: str) -> None:
+    """Say, in one line, what the shipped classifier of affect has met, where real people were filmed."""
+    from signface.corpus.signers import TRACKED
+    from signface.takes.formats.registry import format_of
+
+    for take in takes if classifier == "default" else ():
+        with contextlib.suppress(SignfaceError):  # said when its turn comes
+            if format_of(take).name in TRACKED:
+                warnings.warn(
+                    "the classifier default has met synthetic signers only: on people do not trust the tier affect "
+                    "(channels and --clause lse-questions have met some)",
+                    SignfaceWarning,
+                    stacklevel=2,
+                )
+                return
 
 
 def _of_all(

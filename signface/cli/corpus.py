@@ -154,7 +154,8 @@ def learn(arguments: argparse.Namespace) -> int:
     for signer in learn_signers(corpus, settings_from(arguments, SolveSettings), progress=takes):
         file = signer.save(output / f"{signer.name}.json")
         bases = "the avatar's bases" if signer.bases is None else f"{len(set(signer.bases.bases))} bases of their own"
-        print(f"{file}: {bases}, level of all takes")
+        rest = "" if signer.rest is None else f"rest of {counted(signer.rest.takes, 'take')}, "
+        print(f"{file}: {bases}, {rest}level of all takes")
     return 0
 
 

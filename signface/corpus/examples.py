@@ -13,7 +13,7 @@ from pathlib import Path
 from signface.corpus.describing import recipe_of, stored_or_solved
 from signface.corpus.manifest import Corpus, TakeEntry
 from signface.corpus.origin import Origin, Recipe, find_origin, make_recipe
-from signface.corpus.signers import find_signer
+from signface.corpus.signers import find_signer, warn_of_unknown_rests
 from signface.corpus.store import DescriptorStore, open_store
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError, SignfaceWarning
@@ -90,6 +90,7 @@ def solve_corpus(
             file=corpus.folder,
             hint="fill in the column annotation of takes.csv",
         )
+    warn_of_unknown_rests(entries, corpus.folder, read_as=None if settings is None else settings.read_as)
     store = open_store(corpus.folder)
     recipe = make_recipe(settings)
     known: dict[tuple[str, str | None], Recipe] = {}

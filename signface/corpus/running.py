@@ -26,7 +26,7 @@ from signface.corpus.describing import recipe_of
 from signface.corpus.jobs import ANNOTATING_CODE, FAILED, LOGS, Job, Outcome, annotate_job, solve_job, write_log
 from signface.corpus.manifest import Corpus, TakeEntry
 from signface.corpus.origin import Recipe, code_digest, find_origin, make_recipe, shipped_digest, take_name
-from signface.corpus.signers import find_signer
+from signface.corpus.signers import find_signer, warn_of_unknown_rests
 from signface.corpus.store import DescriptorStore
 from signface.elan.mapping import read_mapping
 from signface.errors import SignfaceError
@@ -90,6 +90,7 @@ def run_corpus(
     """
     folder = Path(os.path.abspath(corpus.folder))
     output = folder / ANNOTATED if output is None else Path(os.path.abspath(output))
+    warn_of_unknown_rests(corpus, folder, read_as=None if settings is None else settings.read_as)
     store = DescriptorStore(folder)  # says at once when a newer signface wrote it
     recipe = make_recipe(settings)
     jobs, failed = plan_jobs(corpus, output, recipe, classifier=classifier, options=options)

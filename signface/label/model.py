@@ -170,6 +170,8 @@ class TrainedModel(Summary):
         """
         self.columns(descriptors)
         normalises = self.card.normalise in BY_SIGNER
+        if level is not None and not set(self.card.bases) <= set(level.names):
+            level = None  # of other columns: weights do not say how measures lie
         if normalises and level is None:
             warnings.warn(
                 f"{self.name} normalises signers, and of this signer only {descriptors.name} is known: "

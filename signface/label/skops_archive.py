@@ -48,6 +48,7 @@ TRUSTED = (
     "sklearn.preprocessing._label.LabelEncoder",
     "sklearn.svm._classes.SVC",
     "sklearn.tree._classes.DecisionTreeClassifier",
+    "sklearn.tree._classes.ExtraTreeClassifier",
     "sklearn.tree._tree.Tree",
 )
 

@@ -239,8 +239,16 @@ def in_order(examples: Sequence[Example]) -> list[Example]:
 
 
 def signer_levels(examples: Sequence[Example]) -> dict[str, SignerLevel]:
-    """The level of each signer: what the corpus says, or that of these takes of theirs; no label is looked at."""
-    levels = {example.signer: example.level for example in examples}
+    """The level of each signer: what the corpus says, or that of these takes of theirs; no label is looked at.
+
+    What the corpus says serves where it is of the takes' own columns: measures are not judged by weights.
+    """
+    levels = {
+        example.signer: example.level
+        if example.level is not None and set(example.descriptors.names) <= set(example.level.names)
+        else None
+        for example in examples
+    }
     for name, level in levels.items():
         if level is None:
             levels[name] = signer_level([example.descriptors for example in examples if example.signer == name])
