@@ -31,6 +31,7 @@ import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
 
+from benchmarks.real_pictures import draw_three
 from benchmarks.real_scores import DRAWS, FRAME_S, interval, judged_labels, judged_sentences, macro_f1, value_codes
 from signface.channels.rules import find_channels
 from signface.corpus.examples import solve_corpus
@@ -209,6 +210,9 @@ def krsl(here: Real, others: Real | None) -> list[Row]:
         ("boosting on measures and head", side_by_side(learnt_segments, folds, SENTENCES)),
     ):
         rows.append(Row("KRSL", what, how, judged_sentences(found, ["br_raise"])))
+        if PICTURES is not None and how == RULE_BY_LEVEL:
+            title = "Raised brows by the shipped rule (KRSL)"
+            draw_three(found, ["br_raise"], PICTURES / "krsl-brows.png", signal="browInnerUp", title=title)
     leaks = leak(judged, measured)
     rows.append(Row("KRSL", "r of brows with pitch at rest", "", {n: (r, r, r) for n, r in leaks.items()}))
     for label, word in (("nod", "nod"), ("chin_up", "chin up"), ("turn_forward", "forward")):
@@ -280,6 +284,9 @@ def lse(here: Real, others: Real | None) -> list[Row]:
     found = side_by_side(learnt_segments, units, SENTENCES.changed(balanced=True))
     how = "boosting on action units and head"
     rows.append(Row("LSE", "found in sentences", how, judged_sentences(found, labels)))
+    if PICTURES is not None:
+        title = "Questions and negation by boosting on action units and head (LSE), signers left out"
+        draw_three(found, labels, PICTURES / "lse-clauses.png", signal="AU01", title=title)
     return rows
 
 
@@ -334,6 +341,8 @@ def gfe(here: Real, others: Real | None) -> list[Row]:
     return [*rows, Row("GFE", f"mean of {len(rows)} expressions", how, {"F frames": (mean, mean, mean)})]
 
 
+#: Where pictures go; None for none.
+PICTURES: Path | None = None
 NAMES = ("krsl", "lse", "buhmap", "gfe")
 
 
@@ -343,9 +352,14 @@ def main() -> None:
     parser.add_argument("folder", type=Path, help="folder of corpora: krsl, lse, buhmap, gfe")
     parser.add_argument("--others", type=Path, help="the same corpora of other persons, to be judged instead")
     parser.add_argument("--only", nargs="+", choices=NAMES, default=NAMES)
+    parser.add_argument("--pictures", type=Path, help="folder for pictures of the best, the middle and the worst take")
     parser.add_argument("-o", "--output", type=Path, help="a .json of the same numbers")
     arguments = parser.parse_args()
     os.environ["OMP_NUM_THREADS"] = "1"
+    global PICTURES
+    PICTURES = arguments.pictures
+    if PICTURES is not None:
+        PICTURES.mkdir(parents=True, exist_ok=True)
     warnings.simplefilter("ignore")
     rows: list[Row] = []
     with tempfile.TemporaryDirectory() as work:

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from signface.cli.options import add_settings_arguments, add_solve_arguments, settings_from
+from signface.cli.options import add_settings_arguments, add_solve_arguments, parameters, settings_from
 from signface.errors import SignfaceError
 from signface.progress import progress
 from signface.settings.solve import SolveSettings
@@ -78,6 +78,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     agree.add_argument(
         "--overlap", type=float, default=0.6, metavar="SHARE",
         help="share of the longer annotation that must overlap for a match (default: %(default)s)",
+    )  # fmt: skip
+    agree.add_argument(
+        "--same", action="append", default=[], type=parameters, metavar="OLD=NEW,...",
+        help="tiers and labels that mean the same: br_raise=raised,brows@K01=brows@S1; may be repeated",
     )  # fmt: skip
     agree.add_argument("--gamma", action="store_true", help="compute gamma too (slow)")
     agree.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="also write tables (.csv) and pictures")
@@ -183,9 +187,12 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
 def compare_annotators(arguments: argparse.Namespace) -> None:
     """Print the agreement on every tier; write tables and pictures when asked."""
     from signface.elan.reference import read_annotators
-    from signface.metrics.tiers import compare_tiers
+    from signface.metrics.tiers import compare_tiers, renamed
 
     annotators = read_annotators(arguments.files)
+    same = {old: str(new) for pairs in arguments.same for old, new in pairs.items()}
+    if same:
+        annotators = renamed(annotators, same)
     agreements = compare_tiers(annotators, tiers=arguments.tier, overlap=arguments.overlap, gamma=arguments.gamma)
     first, second = list(annotators)[:2]
     for agreement in agreements:

@@ -90,6 +90,50 @@ def compare_tiers(
     ]
 
 
+def renamed(
+    annotators: Mapping[str, Mapping[str, pd.DataFrame]], names: Mapping[str, str]
+) -> dict[str, dict[str, pd.DataFrame]]:
+    """The annotators with tiers and labels called as others call them, so that they can be compared.
+
+    Parameters
+    ----------
+    annotators : mapping
+        As for `compare_tiers`.
+    names : mapping
+        Old name of a tier or a label: the new one.
+
+    Raises
+    ------
+    SignfaceError
+        An old name is neither a tier nor a label of any file, or two tiers of one file get one name.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> eva = {"brows@K01": pd.DataFrame({"start_s": [0.0], "end_s": [1.0], "label": ["br_raise"]})}
+    >>> renamed({"eva": eva}, {"brows@K01": "brows@S1", "br_raise": "raised"})["eva"]["brows@S1"]["label"].tolist()
+    ['raised']
+    """
+    known = {tier for tiers in annotators.values() for tier in tiers}
+    labels = {str(label) for tiers in annotators.values() for table in tiers.values() for label in table["label"]}
+    unknown = [name for name in names if name not in known | labels]
+    if unknown:
+        raise SignfaceError(
+            f"no file has a tier or a label {unknown[0]}",
+            hint=f"there are the tiers {', '.join(sorted(known))} and the labels {', '.join(sorted(labels))}",
+        )
+    result: dict[str, dict[str, pd.DataFrame]] = {}
+    for annotator, tiers in annotators.items():
+        theirs: dict[str, pd.DataFrame] = {}
+        for tier, table in tiers.items():
+            name = names.get(tier, tier)
+            if name in theirs:
+                raise SignfaceError(f"{annotator} would have two tiers {name}", hint="rename one of them otherwise")
+            theirs[name] = table.assign(label=[names.get(str(label), label) for label in table["label"]])
+        result[annotator] = theirs
+    return result
+
+
 def _compare(tier: str, annotators: Mapping[str, pd.DataFrame], overlap: float, gamma: bool) -> TierAgreement:
     table = agreement_table(annotators, overlap=overlap, with_gamma=gamma)
     table.insert(0, "tier", tier)

@@ -24,6 +24,7 @@ from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
 from signface.evaluation.corrections import changes, summarise_changes
 from signface.label.persistence import load_model, save_model
+from signface.label.vocabulary import Vocabulary
 from signface.learn.training import Example, train
 from signface.segmentation.segments import Segments
 from signface.settings.eaf import EafOptions
@@ -190,6 +191,20 @@ def test_agreement_wants_two_files_with_a_tier_in_common(tmp_path, capsys):
     assert main(["elan", "agree", str(first)]) == 2
     assert main(["elan", "agree", str(first), str(second)]) == 2
     assert "no filled tier in common" in capsys.readouterr().err
+
+
+def test_what_annotators_call_otherwise_is_compared_as_the_same(tmp_path, capsys):
+    first, second = tmp_path / "a.eaf", tmp_path / "b.eaf"
+    write_eaf(labelled(), first, signer="S1")
+    words = Vocabulary("words", ("calm", "glad"))
+    there = labelled("N J")
+    named = Segments(there.table.assign(label=["calm", "glad"]), name=there.name)
+    write_eaf(named, second, signer="K2", tier="mood", vocabulary=words)
+    same = ["--same", "mood@K2=affect@S1", "--same", "calm=N,glad=J"]
+    assert main(["elan", "agree", str(first), str(second), *same]) == 0
+    assert "affect@S1" in capsys.readouterr().out
+    assert main(["elan", "agree", str(first), str(second), "--same", "mood=affect@S1"]) == 2
+    assert "no file has a tier or a label mood" in capsys.readouterr().err
 
 
 def test_check_names_every_problem_and_changes_nothing(tmp_path, capsys):
