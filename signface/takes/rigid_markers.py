@@ -29,7 +29,7 @@ TURNS = 4
 STILLEST_MM, STILLEST = 0.3, 0.3
 
 #: Head markers whose root mean square distance from one line is less than this (mm) stand together: on one ear, say.
-SPREAD_MM = 20.0
+SPREAD_MM = 15.0
 
 #: Skin that no base moves by more than this (mm) may carry the head: the ridge of the nose, the corners of the eyes,
 #: the temples.

@@ -141,6 +141,16 @@ def test_fewer_than_three_head_markers_are_refused_or_replaced_by_the_least_movi
     assert "least-moving" in still.history[-1]
 
 
+def test_head_markers_that_a_tracker_jitters_alike_have_not_slipped():
+    """Millimetres of jitter that comes and goes, as trackers of pictures have it, are no slip of single markers."""
+    take, _ = moving_face(4.0, 100.0)
+    noise = np.random.default_rng(3).normal(size=(len(take.time) // 20 + 1, 6, 3)).repeat(20, axis=0)[: take.n_frames]
+    jittered = take.positions.copy()
+    jittered[:, 20:] += noise * np.array([1.0, 1.5, 1.0, 2.0, 1.5, 1.0])[:, None]
+    still, _ = stabilise(take.changed("jitter", positions=jittered), head=HEAD, neutral_s=0.0)
+    assert "slipped" not in still.history[-1]
+
+
 def test_head_markers_on_one_line_are_refused():
     take, _ = moving_face(1.0, 100.0)
     positions = take.positions.copy()
