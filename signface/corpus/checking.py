@@ -181,7 +181,7 @@ def grouped(problems: Iterable[str], fewest: int = 3) -> list[str]:
     alike: dict[str, list[str]] = defaultdict(list)
     for problem in problems:
         path, _, what = problem.partition(": ")
-        alike[re.sub(r"\d+", "0", what.replace(Path(path).stem, ""))].append(problem)
+        alike[re.sub(r"\d+", "0", re.sub(rf"\b{re.escape(Path(path).stem)}\b", "", what))].append(problem)
     lines = []
     for same in alike.values():
         lines += same if len(same) < fewest else [f"in {len(same)} files, first {same[0]}"]

@@ -53,7 +53,7 @@ def misfit(places: np.ndarray, points: np.ndarray) -> tuple[float, float]:
     --------
     >>> points = np.array([[0.0, 0, 0], [90, 0, 0], [0, 70, 0], [0, 0, 50]])
     >>> [round(part, 3) for part in misfit(2 * points + 5, points)]
-    [0.0, 0.719]
+    [0.0, 0.55]
     """
     here, there = places - places.mean(axis=0), points - points.mean(axis=0)
     left, singular, right = np.linalg.svd(there.T @ here)

@@ -117,8 +117,8 @@ def face_depth(depth: np.ndarray) -> np.ndarray:
     Returns
     -------
     (F, N) array
-        The middle of the face (the median over the points) in each row, and beside it a running median of each point;
-        NaN where the point has no depth in the row, or that of something else.
+        The middle of the face (the median over the points, each beside its usual place) in each row, and beside it a
+        running median of each point; NaN where the point has no depth in the row, or that of something else.
 
     Examples
     --------
@@ -131,6 +131,8 @@ def face_depth(depth: np.ndarray) -> np.ndarray:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # rows and points without any depth
         middle = np.nanmedian(depth, axis=1, keepdims=True)
+        usual = np.nanmedian(depth - middle, axis=0)  # so that the middle does not leap with the points that are seen
+        middle = np.nanmedian(depth - usual, axis=1, keepdims=True)
         beside = depth - middle
         beside[beside > BEHIND_MM] = np.nan
         beside[np.abs(beside - np.nanmedian(beside, axis=0)) > LEAP_MM] = np.nan
