@@ -15,7 +15,7 @@ from signface.segmentation.energy import bridged
 WINDOWS = ((-1.0, -0.5), (-0.5, -0.2), (-0.2, 0.2), (0.2, 0.5), (0.5, 1.0))
 #: The frame itself, and how fast it changes: means over so long, and the difference of those before and after.
 FRAME_S, SLOPE_S = 0.04, 0.22
-#: Movement to and fro is sought over so long.
+#: Movement back and forth is sought over so long.
 SWING_S = 1.0
 #: The beginning of a take, where a face is often at rest, seconds.
 BEGINNING_S = 0.3
