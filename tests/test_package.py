@@ -53,7 +53,7 @@ def test_the_wheel_holds_data_and_no_build_scripts(names):
     assert {"corpora/mini/takes.csv", "models/faces/default.glb", "models/layouts/default-40.csv"} <= set(names)
 
 
-def test_the_wheel_holds_one_classifier_and_stays_small(wheel, names):
+def test_the_wheel_holds_what_annotates_and_stays_small(wheel, names):
     classifiers = [name for name in names if name.endswith(".skops")]
     assert classifiers == ["models/classifiers/default.skops", "models/classifiers/lse-questions.skops"]
     assert wheel.stat().st_size < 8e6
