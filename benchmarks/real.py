@@ -24,7 +24,7 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +33,7 @@ from joblib import Parallel, delayed
 
 from benchmarks.real_pictures import draw_three
 from benchmarks.real_scores import DRAWS, FRAME_S, interval, judged_labels, judged_sentences, macro_f1, value_codes
-from signface.channels.rules import find_channels
+from signface.channels.rules import find_channels, read_channels
 from signface.corpus.examples import solve_corpus
 from signface.corpus.levels import learn_signers
 from signface.corpus.manifest import read_corpus
@@ -150,6 +150,54 @@ def by_rule(examples: list[Example], channel: str, names: dict[str, str], levels
     return found
 
 
+#: Channel, value, and what is tried for its thresholds: the level that counts, its share that still does, milliseconds.
+TRIED = {
+    "br_raise": ("brows", "raised", ("on", "off"), (0.7, 0.8, 0.9, 1.0, 1.1, 1.25), (0.7, 0.85), (120, 240, 360)),
+    "chin_up": ("head", "chin up", ("on_deg", "off_deg"), (6.0, 8.0, 10.0, 12.0, 14.0), (0.5, 0.7), (160, 320, 560)),
+    "turn_forward": ("head", "forward", ("on_deg", "off_deg"), (12.0, 15.0, 18.0, 21.0), (0.6, 0.8), (160, 320, 560)),
+}
+
+
+def by_chosen_rule(folds: list[Fold], label: str) -> list[tuple[Example, pd.DataFrame]]:
+    """The shipped rule of a value with the thresholds that suit the other signers best, the signal as it ships."""
+    channel, value, (on, off), levels, shares, lengths = TRIED[label]
+    shipped = read_channels()[channel]
+    tables = []
+    for level, share, length in product(levels, shares, lengths):
+        rule = dict(shipped[value])
+        numbers = {on: level, off: share * level, "min_ms": length}
+        rule = {**rule, "signer": {**rule["signer"], **numbers}} if channel == "brows" else {**rule, **numbers}
+        tables.append({channel: {**shipped, value: rule}})
+    everyone = list({e.take: e for fold in folds for side in fold for e in side}.values())
+    found = [dict(zip([e.take for e in everyone], row, strict=True)) for row in _by_tables(everyone, channel, tables)]
+
+    def said(examples: list[Example], number: int) -> list[tuple[Example, pd.DataFrame]]:
+        result = []
+        for example in examples:
+            events = found[number][example.take]
+            names = [label if value in str(word) else NONE for word in events["value"]]
+            result.append((example, events.assign(label=names)))
+        return result
+
+    result = []
+    for train, test in folds:
+        scores = [judged_sentences(said(train, n), [label], intervals=False)["kappa"][0] for n in range(len(tables))]
+        result += said(test, int(np.nanargmax(scores)))
+    return result
+
+
+def _by_tables(examples: list[Example], channel: str, tables: list[dict]) -> list[list[pd.DataFrame]]:
+    """The events of a channel in each take, by each table of rules."""
+    rows = []
+    for table in tables:
+        row = []
+        for example in examples:
+            events = {e.channel: e.table for e in find_channels(example.descriptors, table, level=example.level)}
+            row.append(events.get(channel, pd.DataFrame(columns=["start_s", "end_s", "value"])))
+        rows.append(row)
+    return rows
+
+
 def by_distance(folds: list[Fold], label: str) -> list[tuple[Example, pd.DataFrame]]:
     """The plain rule: brow height over the take's median, with the thresholds that suit the other signers best."""
     grid = [(on, share * on, ms) for on in (0.5, 1.0, 1.5, 2.0, 3.0, 4.0) for share in (0.5, 0.8) for ms in (100, 240)]
@@ -163,13 +211,15 @@ def by_distance(folds: list[Fold], label: str) -> list[tuple[Example, pd.DataFra
 
     result = []
     for train, test in folds:
-        scores = [judged_sentences([(e, found(e, *g)) for e in train], [label])["kappa"][0] for g in grid]
+        pairs = [[(e, found(e, *g)) for e in train] for g in grid]
+        scores = [judged_sentences(pair, [label], intervals=False)["kappa"][0] for pair in pairs]
         best = grid[int(np.nanargmax(scores))]
         result += [(e, found(e, *best)) for e in test]
     return result
 
 
 COLUMNS = ["start_s", "end_s", "label"]
+RULE_OF_OTHERS = "the same signal, thresholds chosen on the other signers"
 RULE_BY_LEVEL = "shipped rule, signer's level (thresholds chosen on K01, K02, K04, K08, K09)"
 
 
@@ -199,14 +249,19 @@ def krsl(here: Real, others: Real | None) -> list[Row]:
         judged = None if others is None else restricted(others.examples("krsl", settings, tier), labels)
         return (mine if judged is None else judged), folds_of(mine, judged)
 
+    def here_only(tier: str, labels: list[str]) -> list[Example]:
+        return restricted(here.examples("krsl", WEIGHTS, tier), labels)
+
     rows, what = [], "raised brows"
     judged, _ = load(WEIGHTS, "brows", ["br_raise"])
     measured, folds = load(MEASURES, "brows", ["br_raise"])
     names = {"raised": "br_raise"}
+    weighed = folds_of(judged, None) if others is None else [(here_only("brows", ["br_raise"]), judged)]
     for how, found in (
         ("brow distance over the take's median", by_distance(folds, "br_raise")),
         ("shipped rule, one take alone", by_rule(judged, "brows", names, levels=False)),
         (RULE_BY_LEVEL, by_rule(judged, "brows", names, levels=True)),
+        (RULE_OF_OTHERS, by_chosen_rule(weighed, "br_raise")),
         ("boosting on measures and head", side_by_side(learnt_segments, folds, SENTENCES)),
     ):
         rows.append(Row("KRSL", what, how, judged_sentences(found, ["br_raise"])))
@@ -220,6 +275,10 @@ def krsl(here: Real, others: Real | None) -> list[Row]:
         for how, levels in (("shipped rule, one take alone", False), (RULE_BY_LEVEL, True)):
             found = by_rule(judged, "head", {word: label}, levels=levels)
             rows.append(Row("KRSL", label, how, judged_sentences(found, [label])))
+        if label in TRIED:
+            weighed = folds_of(judged, None) if others is None else [(here_only("head", [label]), judged)]
+            found = by_chosen_rule(weighed, label)
+            rows.append(Row("KRSL", label, RULE_OF_OTHERS, judged_sentences(found, [label])))
         judged, folds = load(MEASURES, "head", [label])
         found = side_by_side(learnt_segments, folds, SENTENCES.changed(balanced=True))
         rows.append(Row("KRSL", label, "boosting on measures and head", judged_sentences(found, [label])))

@@ -18,7 +18,9 @@ from signface.metrics.bootstrap import cluster_draws
 FRAME_S, DRAWS = 0.04, 2000
 
 
-def judged_sentences(found: list[tuple[Example, pd.DataFrame]], labels: Sequence[str]) -> dict:
+def judged_sentences(
+    found: list[tuple[Example, pd.DataFrame]], labels: Sequence[str], *, intervals: bool = True
+) -> dict[str, tuple[float, float, float]]:
     """Kappa and F1 of frames, F1 of segments, false alarms in takes without any, with intervals over signers."""
     order = [NONE, *labels]
     signers = sorted({example.signer for example, _ in found})
@@ -37,7 +39,8 @@ def judged_sentences(found: list[tuple[Example, pd.DataFrame]], labels: Sequence
             segments[row] += (len(match_annotations(a, b, overlap=0.5)), len(a), len(b))
         if not len(true):
             alarms[row] += (len(hit) > 0, 1)
-    times = np.concatenate([np.ones((1, len(signers))), cluster_draws(len(signers), DRAWS)])
+    draws = DRAWS if intervals else 1
+    times = np.concatenate([np.ones((1, len(signers))), cluster_draws(len(signers), draws)])
     drawn = np.einsum("ds,sij->dij", times, counts)
     parts, alarm = times @ segments, times @ alarms
     with np.errstate(invalid="ignore", divide="ignore"):
