@@ -94,7 +94,8 @@ def find_clause(recording: Recording | Descriptors, model: TrainedModel, *, sign
         level = None
     found = find_segments(descriptors, model, level=None if level is None else level.on(model.card.bases))
     blank = model.card.vocabulary.blank
-    table = found.table[found.table["label"] != blank].reset_index(drop=True) if blank else found.table
+    table = found.table.drop(columns="intensity", errors="ignore")  # of the affect, which has its tier
+    table = table[table["label"] != blank].reset_index(drop=True) if blank else table
     return Clause(model.card.tier, found.changed("find_clause", table), model.card.vocabulary, model.name)
 
 

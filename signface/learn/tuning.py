@@ -31,6 +31,8 @@ GRIDS: dict[str, dict[str, list[Any]]] = {
     "svm-linear": {"C": [0.1, 1.0, 10.0]},
     "svm-rbf": {"C": [0.1, 1.0, 10.0], "gamma": [0.1, 0.3, 1.0, 3.0]},
     "forest": {"min_samples_leaf": [1, 3, 10], "max_features": [0.05, "sqrt", 0.4]},
+    "extra-trees": {"min_samples_leaf": [1, 3, 10], "max_features": [0.05, "sqrt", 0.4]},
+    "boosting": {"balance": [0.0, 0.5, 1.0]},
     "crf": {"penalty": [3e-4, 1e-3, 3e-3]},
     # A sequence model is decoded anew with each of these; its frame classifier is trained once a fold.
     "sequence": {"boundary_weight": [0.7, 1.0, 1.4], "rarity": [0.4, 0.6, 0.8]},

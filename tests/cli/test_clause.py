@@ -50,7 +50,7 @@ def test_real_tables_of_one_signer_get_brows_head_and_clauses(tmp_path, capsys):
     assert {"brows@p3", "head@p3", "clause@p3", "clause-confidence@p3"} <= set(eaf.get_tier_names())
     values = {row[2] for row in eaf.get_annotation_data_for_tier("clause@p3")}
     assert values <= {"wh", "polar", "negation"}
-    vocabulary = {value[0][0][0] for value in eaf.controlled_vocabularies["clause"][1].values()}
+    vocabulary = {value[0][0][0] for value in eaf.controlled_vocabularies["questions"][1].values()}
     assert vocabulary == {"wh", "polar", "negation"}
 
 
