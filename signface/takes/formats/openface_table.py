@@ -18,6 +18,7 @@ import numpy as np
 
 from signface.errors import SignfaceError, SignfaceWarning
 from signface.takes.formats.text import TextFile, TextRows, header_cells
+from signface.takes.formats.uneven import even_frames
 
 #: Under this confidence OpenFace itself counts a frame as failed.
 LEAST_CONFIDENCE = 0.7
@@ -134,11 +135,7 @@ def _even(values: np.ndarray, times: np.ndarray, file: Path) -> tuple[np.ndarray
         out[near] = values
         lost = len(even) - len(near)
         return out, rate, [f"{lost} frames are missing"] if lost else []
-    after = np.searchsorted(place, even, side="left").clip(1, len(place) - 1)
-    before = after - 1
-    share = ((even - place[before]) / (place[after] - place[before])).clip(0, 1)[:, None]
-    out = (1 - share) * values[before] + share * values[after]
-    out[(place[after] - place[before]) > GAP_STEPS] = np.nan
+    out, _ = even_frames(times, values, rate, longest_s=GAP_STEPS / rate)
     note = f"put its uneven times on a grid of {rate:.4g} Hz"
     return out, rate, [note]
 
