@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from signface.columns import joined_sides
 from signface.content import Content
 from signface.descriptors import Descriptors
 from signface.errors import counted
@@ -119,6 +120,9 @@ class Annotation(Content):
         What the model is and where it comes from.
     clauses : tuple of Clause
         What further models found, each on its tier.
+    unseen : mapping of str to tuple of str
+        By channel, the values that the markers cannot show (`signface.channels.rules.unseen_values`): that they were
+        not found says nothing. A channel none of whose values can be seen is not among `channels`.
 
     See Also
     --------
@@ -143,6 +147,7 @@ class Annotation(Content):
     signer: Signer = field(default_factory=Signer)
     card: Card | None = field(default=None, compare=False)
     clauses: tuple[Clause, ...] = ()
+    unseen: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -187,9 +192,21 @@ class Annotation(Content):
 
     @property
     def facts(self) -> dict[str, str]:
-        """What the header of an EAF says of it: `model`, `take`, `residual_mm`."""
+        """What the header of an EAF says of it: `model`, `take`, `residual_mm`.
+
+        And, where there are any, the bases that the markers cannot see (`unobserved`) and the values of channels that
+        they cannot show (`unseen`).
+        """
         residual = "unknown" if self.residual_mm is None else f"{self.residual_mm:.2f}"
-        return {"model": self.model, "take": self.name, "residual_mm": residual}
+        more = {"unobserved": joined_sides(self.descriptors.unobserved), "unseen": self._unseen}
+        told = {name: text for name, text in more.items() if text}
+        return {"model": self.model, "take": self.name, "residual_mm": residual, **told}
+
+    @property
+    def _unseen(self) -> str:
+        """The values that cannot be seen, in words: `blinks; eyes (wide, closed)`, a whole channel by its name."""
+        whole = set(self.unseen) - set(self.channels or {})
+        return "; ".join(name if name in whole else f"{name} ({', '.join(of)})" for name, of in self.unseen.items())
 
     def to_pympi(self, *, options: EafOptions | None = None) -> Eaf:
         """The tiers as an object of pympi-ling, for scripts (`signface.elan.writing.to_pympi`)."""
@@ -214,6 +231,9 @@ class Annotation(Content):
         residual = self.residual_mm
         fit = "" if residual is None else f"; the solved face lies {residual:.2f} mm from the markers (median residual)"
         duration = f"{self.descriptors.duration:.1f} s"
+        blind = joined_sides(self.descriptors.unobserved)
+        fit += f"; no marker shows {blind}" if blind else ""
+        fit += f"; cannot be seen: {self._unseen}" if self.unseen else ""
         return f"{duration}, {counted(len(stable), 'stable segment')}: {', '.join(labels) or 'none'}{fit}"
 
     def _repr_html_(self) -> str:
@@ -275,13 +295,14 @@ def annotate(
     descriptors = solve(recording, face, layout, settings=settings, signer=signer)
     signer = Signer() if signer is None else signer
     segments = find_segments(descriptors, model, level=signer.level)
-    events = None
+    events, unseen = None, {}
     if channels is not False:
-        from signface.channels.rules import find_channels, find_intensities, read_channels
+        from signface.channels.rules import find_channels, find_intensities, read_channels, unseen_values
 
         name = "default" if channels is True else channels
         thresholds = name if isinstance(name, Mapping) else read_channels(name)
         events = {event.channel: event for event in find_channels(descriptors, thresholds, level=signer.level)}
+        unseen = unseen_values(descriptors, thresholds)
         if "intensity" in thresholds and "intensity" not in segments.table and model.card.tier == "affect":
             segments = find_intensities(descriptors, segments, thresholds)
     found = tuple(
@@ -292,7 +313,7 @@ def annotate(
     for one in found:
         named.append(replace(one, tier=f"{one.tier}-{one.model}") if one.tier in taken else one)
         taken.add(named[-1].tier)
-    return Annotation(descriptors, segments, model.name, events, signer, model.card, tuple(named))
+    return Annotation(descriptors, segments, model.name, events, signer, model.card, tuple(named), unseen)
 
 
 def _fitting(model: TrainedModel, descriptors: Descriptors, recording: Recording | Descriptors) -> Any:

@@ -3,11 +3,12 @@
 - `base_column`, `base_of`: the column of a base, and the base of a column.
 - `pose_columns`: poses as three millimetres and three degrees.
 - `poses_of`: the way back.
+- `joined_sides`: names of bases in few words.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -43,6 +44,22 @@ def base_column(base: str) -> str:
 def base_of(column: str) -> str:
     """The base of a column of `base_column`."""
     return column.removeprefix("base:")
+
+
+def joined_sides(names: Sequence[str]) -> str:
+    """Names of bases in few words: `*` stands for Left and Right where both are there.
+
+    Examples
+    --------
+    >>> joined_sides(["eyeBlinkLeft", "eyeBlinkRight", "jawLeft"])
+    'eyeBlink*, jawLeft'
+    """
+    words: list[str] = []
+    for name in names:
+        stem = name.removesuffix("Left").removesuffix("Right")
+        both = stem != name and {f"{stem}Left", f"{stem}Right"} <= set(names)
+        words.append(f"{stem}*" if both else name)
+    return ", ".join(dict.fromkeys(words))
 
 
 def pose_columns(poses: np.ndarray) -> dict[str, np.ndarray]:

@@ -53,6 +53,9 @@ class Descriptors(TimedArrays, Summary, Content):
         Standard deviation of each weight; NaN where the markers say nothing. None when it was not asked for.
     settings : SolveSettings, optional
         How the weights were solved; None where that is not known, or nothing was solved.
+    unobserved : tuple of str
+        Bases that the markers cannot see (`signface.solver.observability`): their weights of 0 say nothing. Empty also
+        where nobody knows, as in weights read from csv.
 
     See Also
     --------
@@ -82,6 +85,7 @@ class Descriptors(TimedArrays, Summary, Content):
     history: tuple[str, ...] = field(default=(), compare=False)
     deviation: np.ndarray | None = None
     settings: SolveSettings | None = field(default=None, compare=False)
+    unobserved: tuple[str, ...] = field(default=(), compare=False)
 
     def _sizes(self) -> str:
         return f"{self.n_frames} frames at {self.rate:g} Hz, {len(self.names)} bases"
@@ -107,6 +111,9 @@ class Descriptors(TimedArrays, Summary, Content):
             if deviation.shape != weights.shape:
                 raise SignfaceError(f"deviations of shape {deviation.shape} do not match weights of {weights.shape}")
             self._hold(deviation=deviation)
+        if set(self.unobserved) - set(names):
+            raise SignfaceError(f"unobserved bases that there are not: {sorted(set(self.unobserved) - set(names))[0]}")
+        self._hold(unobserved=tuple(self.unobserved))
         rate, start, history = float(self.rate), float(self.start), tuple(self.history)
         self._hold(weights=weights, names=names, rate=rate, start=start, residual=residual, head=head, history=history)
 
@@ -136,7 +143,8 @@ class Descriptors(TimedArrays, Summary, Content):
         if self.names == tuple(bases):
             return self
         columns = [self._column(name) for name in bases]
-        return replace(self, weights=self.weights[:, columns], names=tuple(bases), deviation=None)
+        left = tuple(name for name in self.unobserved if name in bases)
+        return replace(self, weights=self.weights[:, columns], names=tuple(bases), deviation=None, unobserved=left)
 
     def _column(self, name: str) -> int:
         if name not in self.names:
@@ -187,7 +195,7 @@ class Descriptors(TimedArrays, Summary, Content):
         over `time`, and `head`, the pose's 4 by 4 matrix over `time`, `row` and `column`.
 
         The attributes are `name`, `rate` (Hz), `history` (a line for each step) and, where the weights were solved,
-        `settings` in words.
+        `settings` in words; and `unobserved`, the names of bases that the markers cannot see, where there are any.
 
         Raises
         ------
@@ -206,5 +214,7 @@ class Descriptors(TimedArrays, Summary, Content):
         attributes = {"name": self.name, "rate": self.rate, "history": "\n".join(self.history)}
         if self.settings is not None:
             attributes["settings"] = str(self.settings)
+        if self.unobserved:
+            attributes["unobserved"] = " ".join(self.unobserved)
         coordinates = {"time": ("time", self.time, {"units": "s"}), "base": list(self.names)}
         return xarray.Dataset(variables, coordinates, attributes)

@@ -8,8 +8,8 @@
 Both begin with `time_s` and end with `residual_mm`, between which there is a column for each base and the head's pose:
 in Parquet the matrix (`head_00` to `head_33`) and, where they are known, the weights' standard deviations
 (`sd:NAME`); in csv, with fewer digits, three millimetres and three degrees (`signface.columns`). Rate, start, name,
-history and settings stand in the metadata of the Parquet, under `signface`. A csv has no place for them that every
-reader of csv passes over.
+history, settings and the bases that the markers cannot see (`unobserved`) stand in the metadata of the Parquet, under
+`signface`. A csv has no place for them that every reader of csv passes over.
 """
 
 from __future__ import annotations
@@ -165,6 +165,7 @@ def _about(first: Descriptors, last: Descriptors) -> dict[str, Any]:
         "name": first.name,
         "history": list(last.history),
         "settings": None if last.settings is None else last.settings.as_dict(),
+        "unobserved": list(last.unobserved),
     }
 
 
@@ -330,6 +331,7 @@ def _exactly(columns: Mapping[str, np.ndarray], about: Mapping[str, Any], file: 
         history=tuple(about["history"]),
         deviation=np.stack(deviations, axis=1) if deviations else None,
         settings=_settings(about.get("settings")),
+        unobserved=tuple(about.get("unobserved", ())),  # files of older versions say nothing of it
     )
 
 

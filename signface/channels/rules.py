@@ -2,6 +2,7 @@
 
 - `read_channels`: the thresholds, from the shipped file or one's own.
 - `find_channels`: the events (`events.ChannelEvents`) of every channel of a take.
+- `unseen_values`: the values that no base of a take can show.
 - `find_intensities`: the intensity (1 to 3) of each stable segment.
 
 The thresholds stand in `models/channels/default.toml`, with what they mean.
@@ -87,8 +88,9 @@ def find_channels(
 ) -> list[ChannelEvents]:
     """Events of every channel.
 
-    A channel none of whose bases the face has is left out, as is gaze when the weights were solved from markers, and
-    the head when its pose is unknown (the identity throughout).
+    Bases that the face has not, or that the markers cannot see (`Descriptors.unobserved`), are passed over. A channel
+    without any other is left out: an empty one would say that nothing was there. So are gaze when the weights were
+    solved from markers, and the head when its pose is unknown (the identity throughout). `unseen_values` names them.
 
     Parameters
     ----------
@@ -112,7 +114,8 @@ def find_channels(
         else:
             used = dict(_values(table))
             signals = {}
-            for value, rule in _values(table):
+            for value, stated in _values(table):
+                rule = _observed(stated, descriptors)
                 signal = weight_signal(descriptors, rule)
                 if signal is None:
                     continue
@@ -126,6 +129,57 @@ def find_channels(
             events = _weight_events(descriptors, signals, used, together)
         channel_events.append(_as_events(channel, table, events))
     return channel_events
+
+
+def unseen_values(
+    descriptors: Descriptors, channels: Mapping[str, Mapping[str, Any]] | None = None
+) -> dict[str, tuple[str, ...]]:
+    """By channel, the values that cannot be found in a take, for no base that the markers see shows them.
+
+    A channel is named only where one of its values needs a base that the face has: a table of action units without
+    cheeks says nothing of cheeks, and nobody expects it to.
+
+    Parameters
+    ----------
+    descriptors : Descriptors
+        With `unobserved` where they were solved.
+    channels : mapping, optional
+        What `read_channels` returns; the shipped thresholds when not given.
+
+    Examples
+    --------
+    >>> bases = ("eyeBlinkLeft", "eyeBlinkRight", "eyeWideLeft")
+    >>> take = Descriptors(np.zeros((9, 3)), bases, rate=100, unobserved=bases[:2])
+    >>> unseen_values(take)
+    {'eyes': ('closed',), 'blinks': ('blink',)}
+    """
+    rules = read_channels() if channels is None else channels
+    unseen = {}
+    for channel, table in rules.items():
+        if channel in ("intensity", "head") or table.get("measured_only"):
+            continue
+        blind = [
+            value
+            for value, rule in _values(table)
+            if weight_signal(descriptors, rule) is not None
+            and weight_signal(descriptors, _observed(rule, descriptors)) is None
+        ]
+        if blind:
+            unseen[channel] = tuple(blind)
+    return unseen
+
+
+def _observed(rule: Mapping[str, Any], descriptors: Descriptors) -> Mapping[str, Any]:
+    """The rule without the bases that the markers cannot see: as 0 they would halve a mean of two sides."""
+    if not descriptors.unobserved:
+        return rule
+    kept = dict(rule)
+    for key in ("bases", "minus"):
+        if key in rule:
+            kept[key] = [base for base in rule[key] if base not in descriptors.unobserved]
+    if "signer" in rule:
+        kept["signer"] = _observed(rule["signer"], descriptors)
+    return kept
 
 
 def closed_vocabularies(channels: Mapping[str, Mapping[str, Any]]) -> list[ChannelEvents]:

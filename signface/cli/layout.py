@@ -61,16 +61,22 @@ def _show(arguments: argparse.Namespace) -> None:
 
 
 def _check(arguments: argparse.Namespace) -> None:
+    from signface.columns import joined_sides
     from signface.face.checking import check_face
     from signface.face.layout_files import read_layout
     from signface.face.reading import read_face
+    from signface.solver.observability import unobserved_bases
+    from signface.solver.thin_shell import ThinShellSolver
 
     face = read_face(arguments.face)
     layout = read_layout(arguments.layout, face)
     report = check_face(face, layout)
     print(f"{layout.name}: {len(layout.face_labels)} face markers, {len(layout.head_labels)} head markers")
-    hidden = (*report.still_on_skin, *report.still_at_markers)
-    print(f"bases that move no marker: {', '.join(hidden) or 'none'}")
+    try:
+        blind = joined_sides(unobserved_bases(ThinShellSolver(face, layout))) or "none"
+    except SignfaceError as error:
+        blind = f"not known, for it cannot be solved with: {error.problem}"
+    print(f"bases that the markers cannot see: {blind}")
     for first, second, cosine in report.alike:
         print(f"nearly the same at the markers: {first} and {second} (cosine {cosine:.3f})")
     if len(layout.head_labels) < 3:

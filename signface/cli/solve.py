@@ -49,6 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from signface.annotation import median_known
+    from signface.columns import joined_sides
     from signface.descriptors_files import WeightsWriter
     from signface.solver.solving import solve_pieces
     from signface.takes.reading import open_recording
@@ -98,5 +99,6 @@ def run(arguments: argparse.Namespace) -> int:
                 print(f"signface: {file}: {note}", file=sys.stderr)
         residual = median_known(np.concatenate(residuals))
         fit = "unknown" if residual is None else f"{residual:.2f} mm"
-        print(f"{file}: {writer.frames} frames, {len(piece.names)} bases, median residual {fit}")
+        blind = f"; no marker shows {joined_sides(piece.unobserved)}" if piece.unobserved else ""
+        print(f"{file}: {writer.frames} frames, {len(piece.names)} bases, median residual {fit}{blind}")
     return 2 if failed else 0

@@ -23,6 +23,7 @@ from signface.face.model import FaceModel
 from signface.settings.solve import SolveSettings
 from signface.signer import Signer
 from signface.solver.methods import make_solver
+from signface.solver.observability import unobserved_bases
 from signface.solver.preparation import Preparation, PreparedTake, prepare_take
 from signface.solver.thin_shell import ThinShellSolver
 from signface.solver.uncertainty import deviations
@@ -151,6 +152,7 @@ def solve_pieces(
         raise SignfaceError(f"the method {settings.method} does not say how uncertain it is", hint="use thin-shell")
     note = " ".join([f"{preparation.note}; solve {settings.method}", *(f"{k}={v:g}" for k, v in given.items())])
     warnings = [f"warning: {known.markers.warning}"] if known is not None and known.markers.warning else []
+    unobserved = unobserved_bases(solver)
     for begin, end in progress(pieces(recording.n_frames, piece), "solving"):
         displacements, head = preparation.frames(begin, end)
         solution = solver.solve(displacements)
@@ -165,6 +167,7 @@ def solve_pieces(
             name=recording.name,
             history=(*(preparation.history if end == recording.n_frames else recording.history), note, *warnings),
             settings=settings,
+            unobserved=unobserved,
         )
 
 
