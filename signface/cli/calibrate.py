@@ -34,13 +34,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the signer's bases, for --signer-file (.csv, .json)",
     )
     parser.add_argument("--signer", default="", metavar="NAME", help="who it is; kept in a .json")
+    parser.add_argument(
+        "--force", action="store_true", help="keep the bases learnt, even if held-out frames are explained no better"
+    )
     add_solve_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Learn the signer's bases and say which, and how far they are from the avatar's."""
     from signface.descriptors import Descriptors
-    from signface.solver.range_of_motion import away_from_avatar, calibrate_signer
+    from signface.solver.range_of_motion import away_from_avatar, calibrate_guarded
     from signface.solver.solving import face_and_layout
     from signface.takes.reading import open_recording
 
@@ -51,9 +54,27 @@ def run(arguments: argparse.Namespace) -> int:
         raise SignfaceError("holds weights, not markers", file=arguments.take)
     settings = settings_from(arguments, SolveSettings)
     face, layout = face_and_layout(recording.labels, settings)
-    signer = calibrate_signer(recording, arguments.shown, face, layout, name=arguments.signer, settings=settings)
+    found = calibrate_guarded(
+        recording,
+        arguments.shown,
+        face,
+        layout,
+        name=arguments.signer,
+        settings=settings,
+        force=arguments.force,
+    )
+    signer = found.signer
     signer.save(arguments.output)
     assert signer.bases is not None
     learnt, apart = set(signer.bases.bases), away_from_avatar(signer.bases, face, layout)
     print(f"{arguments.output}: {len(learnt)} of {face.n_bases} bases, {apart:.0%} away from the avatar's")
+    says = (
+        f"held-out frames are explained to {found.own_mm:.2f} mm, with the avatar's bases to {found.avatar_mm:.2f} mm"
+    )
+    if found.better:
+        print(f"{says}: better calibrated")
+    elif arguments.force:
+        print(f"{says}: not clearly better, kept because of --force")
+    else:
+        print(f"{says}: not clearly better, so the avatar's bases are kept (--force keeps the others)")
     return 0

@@ -8,8 +8,11 @@ import pytest
 from signface.errors import SignfaceError
 from signface.face.layout_files import read_layout
 from signface.face.reading import read_face
+from signface.settings.solve import SolveSettings
 from signface.solver.calibration import calibrate
+from signface.solver.range_of_motion import Shown, away_from_avatar, calibrate_guarded, calibrate_signer
 from signface.solver.thin_shell import ThinShellSolver
+from signface.takes.take import Take
 
 
 @pytest.fixture(scope="module")
@@ -88,3 +91,47 @@ def test_unusable_calibrations_are_refused(avatar):
         calibrate(shown, weights, bases, rate=0.0)
     with pytest.raises(SignfaceError, match="Calibrate the signer"):
         ThinShellSolver(face, layout, signer_bases=bases[:, :39])
+
+
+def _range_of_motion(bases: np.ndarray, names: tuple[str, ...], seed: int) -> tuple[np.ndarray, list[Shown]]:
+    """Displacements of a signer with these bases at 50 Hz: one base after the other, others moving along, jitter."""
+    rng = np.random.default_rng(seed)
+    count, length = len(bases), 40
+    weights = one_after_the_other(count, 50.0)
+    for base in range(count):
+        stretch = weights[base * length : (base + 1) * length]
+        stretch *= rng.uniform(0.6, 1.0)
+        for other in rng.choice(np.delete(np.arange(count), base), 2, replace=False):
+            stretch[:, other] = rng.uniform(0.0, 0.15) * stretch[:, base]
+    shown = [Shown(base * 0.8, (base + 1) * 0.8, (name,)) for base, name in enumerate(names)]
+    marked = np.tensordot(weights, bases, axes=1)
+    return marked + rng.normal(0.0, 0.12, marked.shape), shown
+
+
+def _take(displacements: np.ndarray, face, layout) -> Take:
+    skin = layout.points(face) + displacements
+    head = np.repeat(layout.points(face, layout.head_labels)[None], len(skin), axis=0)
+    return Take(np.concatenate([skin, head], axis=1), (*layout.face_labels, *layout.head_labels), rate=50.0)
+
+
+@pytest.mark.parametrize("departure", [0.0, 0.35])
+def test_held_out_frames_decide_whether_a_signer_gets_bases_of_their_own(avatar, departure):
+    face, layout = avatar
+    rng, bases = np.random.default_rng(5), layout.bases(face)
+    size = np.sqrt((bases**2).mean(axis=(1, 2)))[:, None, None]
+    own = bases + departure * rng.normal(size=bases.shape) * size
+    displacements, shown = _range_of_motion(own, face.names, seed=6)
+    rest = np.zeros((50, *displacements.shape[1:]))
+    take = _take(np.concatenate([rest, displacements]), face, layout)
+    later = [Shown(window.start_s + 1.0, window.end_s + 1.0, window.bases) for window in shown]
+    how = SolveSettings(neutral=0.3)
+    found = calibrate_guarded(take, later, face, layout, settings=how)
+    forced = calibrate_guarded(take, later, face, layout, settings=how, force=True)
+    assert found.better == (departure > 0.0)
+    assert (found.avatar_mm, found.own_mm) == (forced.avatar_mm, forced.own_mm)
+    assert away_from_avatar(forced.signer.bases, face, layout) > 0.01
+    if found.better:
+        assert found.signer == forced.signer
+    else:  # solved exactly as without a file
+        assert np.array_equal(found.signer.bases.at(face, layout), bases)
+    assert calibrate_signer(take, later, face, layout, settings=how) == found.signer
