@@ -40,7 +40,7 @@ from signface.synth.actors import Actor, draw_actors
 Progress = Callable[[Iterable[list[Errors]], int, int], Iterable[list[Errors]]]
 
 #: Changes when a cell's numbers would: cells on disk are then computed anew.
-VERSION = 1
+VERSION = 2
 
 
 @dataclass(frozen=True)

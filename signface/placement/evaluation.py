@@ -20,7 +20,7 @@ from signface.content import Content
 from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
-from signface.solver.adaptation import MorphologicalAdaptation
+from signface.solver.adaptation import SimilarityAdaptation
 from signface.solver.methods import make_solver
 from signface.solver.rivals.gaussian_process import GaussianProcess, SparseOnlineGaussianProcess
 from signface.synth.actors import Actor, Virtual
@@ -139,7 +139,7 @@ def evaluate_layout(
             target = layout.points(face)
             for test in worn:
                 if test.actor.name in tested:
-                    adaptation = MorphologicalAdaptation(test.neutral, target)
+                    adaptation = SimilarityAdaptation(test.neutral, target)
                     moved = adaptation.transform(test.takes) - adaptation.transform(test.neutral)
                     note(mapping, "-", test, solver.solve(moved).weights)
             continue

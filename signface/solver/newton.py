@@ -16,8 +16,13 @@ import numpy as np
 from signface.solver.bounds import AT_REST, KNEE, SMOOTHING, holding_curvature, holding_energy, holding_slope, released
 from signface.solver.loops import RENEW, finish, follow, products
 
-#: Rounds in which markers that stand too far off are drawn nearer. More change nothing that matters.
-SLIP_ROUNDS = 2
+#: Markers that stand too far off are drawn nearer until no weight of the frame changes by more than this. What is left
+#: is then of this size: where two of 40 markers are 4 mm off, the changes fall by a third from round to round.
+#: (After two rounds weights were up to 0.1 off.)
+SLIP_TOLERANCE = 1e-4
+#: Rounds after which a frame is left as it is all the same: where nearly all markers are too far off, changes fall
+#: slowly (0.02 a weight after 20 rounds), and the face explains nothing there anyway.
+SLIP_ROUNDS = 20
 #: Steps of the damped method, each halving the gradient at worst near the optimum.
 DAMPED_STEPS = 400
 #: Frames taken together: what they need then stays in the processor's cache from one loop to the next.
@@ -174,13 +179,15 @@ def minimise(
     how = (bounds, sparsity, release, tolerance)
     weights, residual, farthest = _optimum(rows, problem, first, threads, *how)
     frames = np.arange(len(rows))
+    frames = frames[farthest > reach]
     for _ in range(SLIP_ROUNDS):
-        frames = frames[farthest[frames] > reach]
         if not len(frames):
             break
-        nearer = problem.drawn(weights[frames], rows[frames], reach)
+        before = weights[frames]
+        nearer = problem.drawn(before, rows[frames], reach)
         weights[frames] = _optimum(nearer, problem, first, threads, *how)[0]
-        residual[frames], farthest[frames] = problem.distances(weights[frames], rows[frames])
+        residual[frames] = problem.distances(weights[frames], rows[frames])[0]
+        frames = frames[np.abs(weights[frames] - before).max(axis=1) > SLIP_TOLERANCE]
     return weights, residual
 
 

@@ -144,6 +144,24 @@ def test_a_general_optimiser_finds_the_same_optimum(face, layout, displacements,
         assert which.energy(ours, one, first if which is solver else None)[0] == pytest.approx(found.fun, rel=1e-7)
 
 
+@pytest.mark.parametrize("release", [False, True])
+def test_markers_that_slipped_are_at_the_optimum_of_hubers_estimator(face, layout, release):
+    """There, drawing the far markers as near as they count and solving by plain least squares changes nothing."""
+    rng = np.random.default_rng(2)
+    weights = np.where(rng.random((200, face.n_bases)) < 0.1, rng.random((200, face.n_bases)), 0.0)
+    slipped = np.tensordot(weights, layout.bases(face), axes=1) + rng.normal(0.0, 0.1, (200, 40, 3))
+    slipped[:, [3, 11]] += [2.4, 2.0, 2.5]
+    solver, plain = (ThinShellSolver(face, layout, slip=slip, release=release) for slip in (0.4, 0.0))
+    found = solver.solve(slipped).weights
+    reach = 0.4 * np.sqrt(solver.markers.scale / solver.markers.n_markers)
+    apart = slipped - np.tensordot(found, layout.bases(face), axes=1)
+    distance = np.linalg.norm(apart, axis=2, keepdims=True)
+    assert (distance > reach).any(axis=(1, 2)).mean() > 0.9
+    drawn = slipped - apart * (1.0 - reach / np.maximum(distance, reach))
+    assert np.abs(plain.solve(drawn).weights - found).max() < 1.5e-4
+    assert np.abs(plain.solve(slipped).weights - found).max() > 0.1
+
+
 def test_a_marker_that_has_slipped_hardly_bends_the_face(face, layout, displacements):
     slipped = displacements[:50].copy()
     slipped[:, layout.face_labels.index("RBROI")] += [3.0, 2.0, 0.0]
