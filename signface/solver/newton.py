@@ -21,7 +21,7 @@ from signface.solver.loops import RENEW, finish, follow, products
 #: (After two rounds weights were up to 0.1 off.)
 SLIP_TOLERANCE = 1e-4
 #: Rounds after which a frame is left as it is all the same: where nearly all markers are too far off, changes fall
-#: slowly (0.02 a weight after 20 rounds), and the face explains nothing there anyway.
+#: slowly (a weight still moves by 0.02 a round after 20), and the face explains nothing there anyway.
 SLIP_ROUNDS = 20
 #: Steps of the damped method, each halving the gradient at worst near the optimum.
 DAMPED_STEPS = 400

@@ -12,6 +12,7 @@ from signface.errors import SignfaceError
 from signface.face.layout_files import read_layout
 from signface.settings.solve import SolveSettings
 from signface.solver import preparation
+from signface.solver.newton import SLIP_TOLERANCE
 from signface.solver.solving import solve, solve_pieces
 from signface.takes import gaps
 from signface.takes.cleaning import Kept, cleaning_stages
@@ -63,9 +64,14 @@ def test_pieces_give_the_weights_of_the_whole(piece, gappy, face, layout):
     whole = solve(gappy, face, layout)
     parts = list(solve_pieces(gappy, face, layout, piece=piece))
     assert [part.n_frames for part in parts][:-1] == [piece] * (len(parts) - 1)
-    # The solver starts each frame from the one before, and ends when the gradient is below 1e-8.
-    for field, tolerance in (("weights", 2e-8), ("residual", 2e-8), ("head", 1e-6)):
-        np.testing.assert_allclose(joined(parts, field), getattr(whole, field), rtol=0, atol=tolerance)
+    # The solver starts each frame from the one before, and ends when the gradient is below 1e-8. Where markers slip,
+    # each round hands its rounding on to the next, and ends when no weight changes by more than the tolerance.
+    for field, tolerance, slipping in (
+        ("weights", 2e-8, SLIP_TOLERANCE), ("residual", 2e-8, SLIP_TOLERANCE), ("head", 1e-6, 1e-6)
+    ):
+        difference = np.abs(joined(parts, field) - getattr(whole, field))
+        assert difference.max() < slipping
+        assert np.quantile(difference, 0.99) < tolerance
     np.testing.assert_allclose(np.concatenate([part.time for part in parts]), whole.time, rtol=0, atol=1e-9)
     assert parts[-1].history == whole.history
 
@@ -83,7 +89,7 @@ def test_a_filter_that_needs_the_whole_take_gets_it(gappy, face, layout):
     options = {"settings": SolveSettings(neutral=0.33, filter_method="raised-sine")}
     whole = solve(gappy, face, layout, **options)
     parts = list(solve_pieces(gappy, face, layout, piece=611, **options))
-    np.testing.assert_allclose(joined(parts, "weights"), whole.weights, rtol=0, atol=2e-8)
+    np.testing.assert_allclose(joined(parts, "weights"), whole.weights, rtol=0, atol=SLIP_TOLERANCE)
 
 
 def test_files_are_read_in_the_same_pieces_as_takes(gappy, tmp_path):
