@@ -162,6 +162,21 @@ def test_markers_that_slipped_are_at_the_optimum_of_hubers_estimator(face, layou
     assert np.abs(plain.solve(slipped).weights - found).max() > 0.1
 
 
+def test_landmarks_that_are_all_too_far_off_are_solved_to_the_optimum_too(face, layout):
+    """As in films; by three hundred plain rounds of Huber's, to which momentum is added to need fewer."""
+    rng = np.random.default_rng(3)
+    off = rng.normal(0.0, 2.0, (60, 40, 3))
+    solver, plain = (ThinShellSolver(face, layout, slip=slip) for slip in (0.4, 0.0))
+    found, slow = solver.solve(off).weights, plain.solve(off).weights
+    reach = 0.4 * np.sqrt(solver.markers.scale / solver.markers.n_markers)
+    for _ in range(300):
+        apart = off - np.tensordot(slow, layout.bases(face), axes=1)
+        distance = np.linalg.norm(apart, axis=2, keepdims=True)
+        slow = plain.solve(off - apart * (1.0 - reach / np.maximum(distance, reach))).weights
+    assert (distance > reach).mean() > 0.8
+    assert np.quantile(np.abs(slow - found).max(axis=1), [0.5, 0.9]).tolist() == pytest.approx([0.0, 0.0], abs=2e-3)
+
+
 def test_a_marker_that_has_slipped_hardly_bends_the_face(face, layout, displacements):
     slipped = displacements[:50].copy()
     slipped[:, layout.face_labels.index("RBROI")] += [3.0, 2.0, 0.0]
