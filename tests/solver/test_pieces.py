@@ -67,7 +67,9 @@ def test_pieces_give_the_weights_of_the_whole(piece, gappy, face, layout):
     # The solver starts each frame from the one before, and ends when the gradient is below 1e-8. Where markers slip,
     # each round hands its rounding on to the next, and ends when no weight changes by more than the tolerance.
     for field, tolerance, slipping in (
-        ("weights", 2e-8, SLIP_TOLERANCE), ("residual", 2e-8, SLIP_TOLERANCE), ("head", 1e-6, 1e-6)
+        ("weights", 2e-8, SLIP_TOLERANCE),
+        ("residual", 2e-8, SLIP_TOLERANCE),
+        ("head", 1e-6, 1e-6),
     ):
         difference = np.abs(joined(parts, field) - getattr(whole, field))
         assert difference.max() < slipping
