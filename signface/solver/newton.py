@@ -18,8 +18,8 @@ from signface.solver.loops import RENEW, finish, follow, products
 
 #: Markers that stand too far off are drawn nearer until no weight of the frame changes by more than this.
 SLIP_TOLERANCE = 1e-4
-#: Rounds after which a frame is left as it is all the same. Two of 40 markers that are 4 mm off need some ten. Landmarks
-#: of films fit no face better than 3 mm, nearly all are too far off, and after 80 rounds one frame of 1,000 has a
+#: Rounds after which a frame is left as it is all the same. Two of 40 markers that are 4 mm off need some ten.
+#: Landmarks of films fit no face better than 3 mm, nearly all are too far off, and after 80 rounds one frame of 1,000 has a
 #: weight that is more than 0.05 from the optimum (of 20 rounds without momentum it is one of six).
 SLIP_ROUNDS = 100
 #: Steps of the damped method, each halving the gradient at worst near the optimum.
@@ -143,8 +143,8 @@ def minimise(
     """Weights at the optimum of every frame, and how far from the markers they leave the face.
 
     Frames in which markers stand too far off are solved again with those drawn nearer. These are Huber's modified
-    residuals (P. J. Huber, Robust Statistics, 1981, 7.8): the least squares of each round have the same matrix. They are
-    proximal gradient steps on what is taken off the markers, which is why momentum may be added (A. Beck and
+    residuals (P. J. Huber, Robust Statistics, 1981, 7.8): the least squares of each round have the same matrix. They
+    are proximal gradient steps on what is taken off the markers, which is why momentum may be added (A. Beck and
     M. Teboulle, A fast iterative shrinkage-thresholding algorithm, 2009).
 
     Parameters
