@@ -19,8 +19,8 @@ from signface.solver.loops import RENEW, finish, follow, products
 #: Markers that stand too far off are drawn nearer until no weight of the frame changes by more than this.
 SLIP_TOLERANCE = 1e-4
 #: Rounds after which a frame is left as it is all the same. Two of 40 markers that are 4 mm off need some ten.
-#: Landmarks of films fit no face better than 3 mm, nearly all are too far off, and after 80 rounds one frame of 1,000 has a
-#: weight that is more than 0.05 from the optimum (of 20 rounds without momentum it is one of six).
+#: Landmarks of films fit no face better than 3 mm, nearly all are too far off, and after 80 rounds one frame of 1,000
+#: has a weight that is more than 0.05 from the optimum (of 20 rounds without momentum it is one of six).
 SLIP_ROUNDS = 100
 #: Steps of the damped method, each halving the gradient at worst near the optimum.
 DAMPED_STEPS = 400
