@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from signface.face.model import FaceModel
     from signface.label.model import Card, TrainedModel
     from signface.label.vocabulary import Vocabulary
+    from signface.segmentation.noise import Jitter
     from signface.segmentation.segments import Segments
     from signface.settings.eaf import EafOptions
     from signface.settings.solve import SolveSettings
@@ -190,6 +191,13 @@ class Annotation(Content):
         assert self.descriptors.residual is not None
         return median_known(self.descriptors.residual)
 
+    @cached_property
+    def jitter(self) -> Jitter | None:
+        """What of the motion is jitter of the tracker; None for a take of fewer than three frames."""
+        from signface.segmentation.noise import jitter
+
+        return jitter(self.descriptors) if self.descriptors.n_frames >= 3 else None
+
     @property
     def facts(self) -> dict[str, str]:
         """What the header of an EAF says of it: `model`, `take`, `residual_mm`.
@@ -230,6 +238,7 @@ class Annotation(Content):
             labels.append(f"{self.vocabulary.describe(str(label))} {total:.1f} s (confidence {confidence:.0%})")
         residual = self.residual_mm
         fit = "" if residual is None else f"; the solved face lies {residual:.2f} mm from the markers (median residual)"
+        fit += "" if self.jitter is None else f"; {self.jitter}"
         duration = f"{self.descriptors.duration:.1f} s"
         blind = joined_sides(self.descriptors.unobserved)
         fit += f"; no marker shows {blind}" if blind else ""

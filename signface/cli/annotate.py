@@ -78,6 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Annotate every take; those that cannot be are named, and the others still are."""
     one_thread_for_matrices()
     from signface.annotation import annotate
+    from signface.segmentation.noise import warn_of_jitter
     from signface.solver.solving import solve
     from signface.takes.reading import open_recording
 
@@ -128,6 +129,7 @@ def run(arguments: argparse.Namespace) -> int:
                 if arguments.figure:
                     save_picture(result, face, file.with_suffix(".png"))
                 print(f"{file}: {result}")
+                warn_of_jitter(result.descriptors)
             except SignfaceError as error:
                 if len(takes) == 1 or error is model.exception():
                     raise

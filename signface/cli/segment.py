@@ -24,6 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Cut the recording and write its segments."""
     from signface.segmentation.cutting import segment
+    from signface.segmentation.noise import jitter, warn_of_jitter
     from signface.segmentation.segments import write_segments
     from signface.solver.solving import solve
     from signface.takes.reading import open_recording
@@ -35,4 +36,7 @@ def run(arguments: argparse.Namespace) -> None:
     segments = segment(descriptors)
     write_segments(segments, arguments.output)
     stable = int((segments.table["kind"] == "stable").sum())
-    print(f"{arguments.output}: {stable} stable, {len(segments) - stable} transitions in {descriptors.duration:.1f} s")
+    said = f"; {jitter(descriptors)}" if descriptors.n_frames >= 3 else ""
+    cut = f"{stable} stable, {len(segments) - stable} transitions in {descriptors.duration:.1f} s"
+    print(f"{arguments.output}: {cut}{said}")
+    warn_of_jitter(descriptors)

@@ -61,6 +61,17 @@ def match_boundaries(
     """
     span = _common_span(reference, found)
     first, second = _boundaries(reference, *span), _boundaries(found, *span)
+    return first, second, match_times(first, second, tolerance_s)
+
+
+def match_times(first: np.ndarray, second: np.ndarray, tolerance_s: float) -> list[tuple[int, int]]:
+    """Pairs of places in two rising arrays of times (s), each in one pair at most, as many as there can be.
+
+    Examples
+    --------
+    >>> match_times(np.array([1.0, 2.0]), np.array([1.9, 2.05]), 0.2)
+    [(1, 0)]
+    """
     pairs = []
     i = j = 0
     while i < len(first) and j < len(second):  # with one tolerance for all, taking the earliest pair is optimal
@@ -71,7 +82,7 @@ def match_boundaries(
             i += 1
         else:
             j += 1
-    return first, second, pairs
+    return pairs
 
 
 def mean_iou(reference: pd.DataFrame, found: pd.DataFrame) -> float:

@@ -1,11 +1,13 @@
 """Energy curves of a take: how fast its blendshape weights move.
 
 - `energies`: the two curves of the thesis (eq. 4.4 and 4.5) and their combination.
+- `rates_of_change`: what they add up, base by base.
 - `Energies`: what it returns.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
@@ -21,7 +23,7 @@ FINE_RATE = 100.0
 
 #: Curves of takes that are still in use: segmentation, ELAN's curves and the figure all want them. Descriptors do not
 #: change.
-_KNOWN: WeakKeyDictionary[Descriptors, dict[tuple[float, float, float], Energies]] = WeakKeyDictionary()
+_KNOWN: WeakKeyDictionary[Descriptors, dict[tuple[float | bytes, ...], Energies]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +60,12 @@ class Energies(Content):
 
 
 def energies(
-    descriptors: Descriptors, *, window_s: float = 0.23, time_constant_s: float = 0.15, pulse_s: float = 0.3
+    descriptors: Descriptors,
+    *,
+    window_s: float = 0.23,
+    time_constant_s: float = 0.15,
+    pulse_s: float = 0.3,
+    spared: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Energies:
     """Velocity and acceleration energies of the weights of a take (thesis 4.4.2, eq. 4.4 and 4.5).
 
@@ -88,6 +95,8 @@ def energies(
         See above, in seconds.
     pulse_s : float
         The longest movement and return that is taken out, in seconds; 0 leaves everything.
+    spared : (N,) and (N,) arrays, optional
+        Velocities (1/s) and accelerations (1/s^2) of each base that do not count: only what is beyond them is added.
 
     Returns
     -------
@@ -115,22 +124,35 @@ def energies(
         )
     if window_s <= 0 or time_constant_s <= 0 or pulse_s < 0:
         raise SignfaceError("the window and the time constant of the energies must be positive seconds")
-    known, key = _KNOWN.setdefault(descriptors, {}), (window_s, time_constant_s, pulse_s)
+    without = () if spared is None else tuple(one.tobytes() for one in spared)
+    known, key = _KNOWN.setdefault(descriptors, {}), (window_s, time_constant_s, pulse_s, *without)
     if key in known:
         return known[key]
+    time, changes = rates_of_change(descriptors, window_s=window_s, pulse_s=pulse_s)
+    sizes = (np.abs(change) for change in changes)
+    if spared is not None:
+        sizes = (np.maximum(size - least, 0.0) for size, least in zip(sizes, spared, strict=True))
+    speed, change = (size.sum(axis=1) for size in sizes)
+    curves = Energies(time=time, velocity=speed, acceleration=change, time_constant_s=time_constant_s)
+    known[key] = curves
+    return curves
+
+
+def rates_of_change(
+    descriptors: Descriptors, *, window_s: float, pulse_s: float
+) -> tuple[np.ndarray, Iterator[np.ndarray]]:
+    """(K,) times, and then the (K, N) velocities (1/s) and accelerations (1/s^2) of the weights; see `energies`.
+
+    One after the other: of a long take both at once would be many.
+    """
     weights = bridged(descriptors)
     factor = max(1, int(np.ceil(FINE_RATE / descriptors.rate)))
     time, weights = _refined(descriptors.time, weights, factor)
     rate = descriptors.rate * factor
     weights = _without_pulses(weights, pulse_s, rate)
     window = _window_frames(window_s, rate, len(time))
-    speed, change = (
-        np.abs(correlate1d(weights, _derivative(window, rate, order), axis=0, mode="mirror")).sum(axis=1)
-        for order in (1, 2)
-    )
-    curves = Energies(time=time, velocity=speed, acceleration=change, time_constant_s=time_constant_s)
-    known[key] = curves
-    return curves
+    kernels = (_derivative(window, rate, order) for order in (1, 2))
+    return time, (correlate1d(weights, kernel, axis=0, mode="mirror") for kernel in kernels)
 
 
 def bridged(descriptors: Descriptors) -> np.ndarray:

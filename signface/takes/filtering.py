@@ -3,6 +3,7 @@
 - `lowpass`: a take, filtered; `butterworth` or `raised-sine`.
 - `Lowpass`: the same as a stage, for any recording.
 - `raised_sine_response`: the spectral window of equation 7.1.
+- `lowpass_response`: what either filter leaves of each frequency.
 """
 
 from __future__ import annotations
@@ -88,6 +89,34 @@ def _butterworth(signals: np.ndarray, rate: float, cutoff_hz: float) -> np.ndarr
     )
     forward_and_backward(longer, b, a, np.array([b[1] + b[2] - a[1] - a[2], b[2] - a[2]]))
     return longer[pad : pad + len(signals)]
+
+
+def lowpass_response(frequencies: np.ndarray, rate: float, *, cutoff_hz: float, method: str) -> np.ndarray:
+    """Gain of `lowpass` at some frequencies: 1 passes, 0 is filtered out; 1 everywhere where nothing is filtered.
+
+    Parameters
+    ----------
+    frequencies : array, Hz
+        From 0 to half the rate.
+    rate : float
+        Of the recording, Hz.
+    cutoff_hz, method
+        See `lowpass`.
+
+    Examples
+    --------
+    >>> lowpass_response(np.array([0, 12.0, 60]), 200.0, cutoff_hz=12.0, method="butterworth").round(3).tolist()
+    [1.0, 0.707, 0.001]
+    >>> lowpass_response(np.array([0, 10.0]), 20.0, cutoff_hz=12.0, method="butterworth").tolist()
+    [1.0, 1.0]
+    """
+    if cutoff_hz > HIGHEST_CUTOFF * rate:
+        return np.ones(np.shape(frequencies))
+    if method == "raised-sine":
+        return raised_sine_response(frequencies, cutoff_hz, cutoff_hz / 2)
+    b, a = _butterworth_coefficients(rate, cutoff_hz)
+    turn = np.exp(-2j * np.pi * np.asarray(frequencies) / rate)
+    return np.abs(np.polyval(b[::-1], turn) / np.polyval(a[::-1], turn)) ** 2
 
 
 def _forgetting(denominator: np.ndarray) -> int:
