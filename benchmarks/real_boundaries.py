@@ -23,13 +23,13 @@ from signface.segmentation.cutting import segment
 from signface.segmentation.noise import jitter
 
 #: Tolerances (s), and how often as many boundaries are placed at random in each take.
-TOLERANCES, PLACED = (0.1, 0.2), 50
+TOLERANCES, PLACED = (0.1, 0.2), 30
 #: An annotation that begins or ends so near to an end of its take was cut off by it (s).
 CUT_OFF_S = 0.05
 #: What is tried for the thresholds of the segmentation.
 TRIED = tuple(
     {"prominence": prominence, "noise_factor": unrest, "least_stable_s": stable}
-    for prominence, unrest, stable in product((0.15, 0.3, 0.5), (2.0, 4.0, 8.0), (0.0, 0.15))
+    for prominence, unrest, stable in product((0.15, 0.5), (2.0, 4.0, 8.0), (0.0, 0.15))
 )
 
 #: Finds rising times of boundaries in a take (s).

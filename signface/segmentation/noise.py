@@ -38,8 +38,11 @@ SMALLER_HALF = 0.14252
 LEAST_VALUES = 12
 #: Length of the jitter that is drawn to find its energies (s).
 DRAWN_S = 10.0
-#: A take most of whose activity is jitter is warned of.
-MOSTLY = 0.5
+#: Deviations smaller than this part of the largest weight are rounding of the processor.
+ROUNDING = 1e-9
+#: A take is warned of when more than this share of its activity is jitter, and that is at least so much (1/s): the
+#: least that a transition is made of, so that a still face is not warned of.
+MOSTLY, LEAST_ACTIVITY = 0.5, 0.5
 
 _KNOWN: WeakKeyDictionary[Descriptors, dict[tuple, Jitter]] = WeakKeyDictionary()
 
@@ -80,8 +83,8 @@ class Jitter(Content):
 
     @property
     def most(self) -> bool:
-        """Whether most of the take's activity is jitter."""
-        return self.share > MOSTLY
+        """Whether most of the take's activity is jitter, and enough to be taken for motion."""
+        return self.share > MOSTLY and self.activity > LEAST_ACTIVITY
 
 
 def jitter(
@@ -191,7 +194,9 @@ def _drawn(descriptors: Descriptors, cutoff_hz: float, method: str) -> tuple[Des
         return Descriptors(np.zeros((frames, len(names))), names, rate), np.zeros(len(names))
     gain = lowpass_response(np.fft.rfftfreq(frames, 1 / rate), rate, cutoff_hz=cutoff_hz, method=method)
     passed = np.abs(np.fft.rfft(taps, frames)) * gain
-    scale = _deviation(seen) / np.sqrt(_mean_square(passed, frames))  # of the jitter before the filter
+    found = _deviation(seen)
+    found[found < ROUNDING * np.nanmax(np.abs(descriptors.weights))] = 0.0
+    scale = found / np.sqrt(_mean_square(passed, frames))  # of the jitter before the filter
     white = np.random.default_rng(0).normal(size=(frames, len(names))) @ _root(_correlation(seen)) * scale
     weights = np.fft.irfft(np.fft.rfft(white, axis=0) * gain[:, None], frames, axis=0)
     return Descriptors(weights, names, rate), scale * np.sqrt(_mean_square(gain, frames))
