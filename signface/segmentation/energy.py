@@ -23,7 +23,7 @@ FINE_RATE = 100.0
 
 #: Curves of takes that are still in use: segmentation, ELAN's curves and the figure all want them. Descriptors do not
 #: change.
-_KNOWN: WeakKeyDictionary[Descriptors, dict[tuple[float | bytes, ...], Energies]] = WeakKeyDictionary()
+_KNOWN: WeakKeyDictionary[Descriptors, dict[tuple[float, float, float, bytes], Energies]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,8 +124,8 @@ def energies(
         )
     if window_s <= 0 or time_constant_s <= 0 or pulse_s < 0:
         raise SignfaceError("the window and the time constant of the energies must be positive seconds")
-    without = () if spared is None else tuple(one.tobytes() for one in spared)
-    known, key = _KNOWN.setdefault(descriptors, {}), (window_s, time_constant_s, pulse_s, *without)
+    without = b"" if spared is None else np.concatenate(spared).tobytes()
+    known, key = _KNOWN.setdefault(descriptors, {}), (window_s, time_constant_s, pulse_s, without)
     if key in known:
         return known[key]
     time, changes = rates_of_change(descriptors, window_s=window_s, pulse_s=pulse_s)
