@@ -14,12 +14,14 @@ needs neither.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from signface.corpus.examples import solve_corpus
 from signface.corpus.manifest import read_corpus
+from signface.errors import SignfaceError
 from signface.evaluation.protocol import score_model
 from signface.files import whole_file
 from signface.label.model import Card
@@ -30,6 +32,14 @@ from signface.progress import progress
 from signface.settings.choices import NAMES, SEQUENCE_NAMES
 from signface.settings.solve import SolveSettings
 from signface.settings.training import TrainingSettings
+from signface.solver.solving import solve
+from signface.synth.corpus import TakeRequest, plan_corpus
+from signface.synth.variety import varied_take
+
+#: Signers and seed of the corpus that is trained on, and how often each of its takes is acted and recorded otherwise.
+SIGNERS, SEED, COPIES = 12, 301, 2
+#: Share of varied takes whose neutral frame is told rather than found.
+TOLD = 0.25
 
 FOLDER = Path(__file__).resolve().parent / "classifiers"
 #: name: classifier and kinds of takes that it is trained on.
@@ -58,6 +68,38 @@ def main() -> None:
     for name in SHIPPED:
         build(name, training, test)
         print((FOLDER / f"{name}.md").read_text(encoding="utf-8"))
+
+
+def varied_examples(
+    *, signers: int = SIGNERS, seed: int = SEED, copies: int = COPIES, workers: int = 2
+) -> list[Example]:
+    """The takes of a corpus, each acted and recorded otherwise `copies` times (`signface.synth.variety`), solved."""
+    from joblib import Parallel, delayed
+
+    wanted = [(request, copy) for copy in range(copies) for request in plan_corpus(signers=signers, seed=seed)]
+    made: Iterable[Example | None] = Parallel(n_jobs=workers, return_as="generator")(
+        delayed(varied_example)(*one) for one in wanted
+    )
+    return [example for example in progress(made, "varying", total=len(wanted)) if example is not None]
+
+
+def varied_example(request: TakeRequest, copy: int) -> Example | None:
+    """A varied take, solved as users solve; None where too little of the face is seen."""
+    made = varied_take(request, copy)
+    told = request.stream(what=200 + copy).random() < TOLD
+    settings = SolveSettings(layout="default-40", neutral=made.neutral_s if told else "auto")
+    try:
+        descriptors = solve(made.take, settings=settings)
+    except SignfaceError:
+        return None
+    return Example(
+        take=f"{request.name}_{copy}",
+        signer=request.signer_name,
+        kind=request.kind,
+        descriptors=replace(descriptors, deviation=None, head=None),
+        reference=made.reference,
+        sentence=request.sentence,
+    )
 
 
 def build(name: str, training: list[Example], test: list[Example]) -> None:

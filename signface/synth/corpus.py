@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 from functools import lru_cache
 from os import PathLike
 from pathlib import Path
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -46,6 +47,9 @@ from signface.synth.programme import (
 from signface.takes.formats.c3d import write_c3d
 from signface.takes.take import Take
 
+#: `change(weights, plan, time, names)`: (F, N) weights in [0, 1] made of those acted.
+Change = Callable[[np.ndarray, Programme, np.ndarray, tuple[str, ...]], np.ndarray]
+
 RATE = 200.0
 FACE, LAYOUT = "default", "default-40"
 #: What a folder made here holds; a folder without it is somebody else's.
@@ -56,6 +60,25 @@ EDITION = 1
 DATE = "2018-05-07T12:00:00+00:00"
 #: The signers of the corpus that ships; no other seed gives them.
 MINI_SEED = 20180507
+
+
+class Requested(Protocol):
+    """What writing asks of a take to be made, by whichever generator; attributes as of `TakeRequest`."""
+
+    @property
+    def kind(self) -> str: ...
+
+    @property
+    def signer_name(self) -> str: ...
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def sentence(self) -> str | None: ...
+
+
+Request = TypeVar("Request", bound=Requested)
 
 
 @dataclass(frozen=True)
@@ -188,16 +211,24 @@ def _stage() -> tuple[FaceModel, MarkerLayout, np.ndarray, tuple[str, ...]]:
     return face, read_layout(LAYOUT, face), identities, names
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def make_signer(seed: int, signer: int, spread: Spread) -> Signer:
     """Signer number `signer` of the corpus with this seed."""
+    head, glued = _glued_head(seed, signer)
+    return Signer(head, draw_habits(_stream(seed, signer, 1), spread), glued)
+
+
+@lru_cache(maxsize=8)
+def _glued_head(seed: int, signer: int) -> tuple[Head, Glued]:
+    """A signer's head and the markers on it, which are the same however far their faces stray."""
     face, layout, identities, names = _stage()
+    head = draw_head(face, identities, names, _stream(seed, signer, 0))
+    return head, glue_markers(head, layout, _stream(seed, signer, 2))
 
-    def stream(what: int) -> np.random.Generator:
-        return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(signer, 0, what)))
 
-    head = draw_head(face, identities, names, stream(0))
-    return Signer(head, draw_habits(stream(1), spread), glue_markers(head, layout, stream(2)))
+def _stream(seed: int, signer: int, what: int) -> np.random.Generator:
+    """Random numbers of a signer for one purpose."""
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(signer, 0, what)))
 
 
 def make_plan(request: TakeRequest, habits: Habits) -> Programme:
@@ -212,7 +243,7 @@ def make_plan(request: TakeRequest, habits: Habits) -> Programme:
     return plan_utterance(request.number, rng, habits, times=1 if request.mini else 3)
 
 
-def make_take(request: TakeRequest, spread: Spread | None = None) -> SyntheticTake:
+def make_take(request: TakeRequest, spread: Spread | None = None, *, change: Change | None = None) -> SyntheticTake:
     """Act and record one take.
 
     Parameters
@@ -220,6 +251,8 @@ def make_take(request: TakeRequest, spread: Spread | None = None) -> SyntheticTa
     request : TakeRequest
     spread : Spread, optional
         How far faces stray from the prototypes.
+    change : callable, optional
+        Makes other weights of those acted (`signface.synth.variety.Acting`).
 
     Returns
     -------
@@ -231,6 +264,8 @@ def make_take(request: TakeRequest, spread: Spread | None = None) -> SyntheticTa
     names = signer.head.face.names
     time = np.arange(round(plan.duration * RATE)) / RATE
     weights = perform(plan, time, signer.habits, spread, names, request.stream(what=1))
+    if change is not None:
+        weights = change(weights, plan, time, names)
     poses = head_motion(plan, time, RATE, request.stream(what=2))
     positions = record(signer.head, signer.glued, weights, poses, plan, RATE, request.stream(what=3))
     take = Take(positions, signer.glued.labels, RATE, name=request.name, history=("synthetic",))
@@ -256,7 +291,7 @@ def make_take(request: TakeRequest, spread: Spread | None = None) -> SyntheticTa
     )
 
 
-def write_synthetic_take(folder: Path, request: TakeRequest, made: SyntheticTake) -> TakeEntry:
+def write_synthetic_take(folder: Path, request: Requested, made: SyntheticTake) -> TakeEntry:
     """Write a take (`NAME.c3d`), its annotation under `reference/` and the truth about it under `truth/`.
 
     The annotation does not stand beside the recording: that is where `signface annotate` puts its own.
@@ -280,7 +315,7 @@ def write_synthetic_take(folder: Path, request: TakeRequest, made: SyntheticTake
     )
 
 
-def annotation_of(folder: Path, request: TakeRequest) -> Path:
+def annotation_of(folder: Path, request: Requested) -> Path:
     """Where the reference annotation of a take stands."""
     return folder / "reference" / f"{request.name}.eaf"
 
@@ -331,16 +366,31 @@ def synthesise(
         "takes": [request.name for request in requests],
         "spread": asdict(spread),
     }
+    return write_corpus(folder, settings, requests, lambda request: make_take(request, spread), show)
+
+
+def write_corpus(
+    folder: Path,
+    settings: dict[str, Any],
+    requests: list[Request],
+    make: Callable[[Request], SyntheticTake],
+    show: Callable[[list[Request]], Iterable[Request]],
+) -> Corpus:
+    """Make the takes asked for and write them to a folder that is new, empty, or was made with the same settings.
+
+    Raises
+    ------
+    SignfaceError
+        As `synthesise`.
+    """
     _make_sure_it_is_ours(folder, settings, requests)
     with whole_file(folder / RECORD) as temporary:
         temporary.write_text(json.dumps(settings, indent=1) + "\n", encoding="utf-8")
-    write_takes(
-        folder, [write_synthetic_take(folder, request, make_take(request, spread)) for request in show(requests)]
-    )
+    write_takes(folder, [write_synthetic_take(folder, request, make(request)) for request in show(requests)])
     return read_corpus(folder)
 
 
-def _make_sure_it_is_ours(folder: Path, settings: dict, requests: list[TakeRequest]) -> None:
+def _make_sure_it_is_ours(folder: Path, settings: dict[str, Any], requests: Sequence[Requested]) -> None:
     if not folder.exists():
         return
     if not folder.is_dir():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from signface.face.layout_files import read_layout
+from signface.solver.displacements import neutral_places, steady_places
 from signface.solver.resting import resting_time
 from signface.takes.neutral import neutral_candidates
 from signface.takes.reading import read_take
@@ -63,3 +64,34 @@ def test_without_head_markers_the_still_stretch_near_the_median_pose_is_taken(fa
     take, _ = held_smile(face, layout, 1.0)
     bare = Take(take.select(layout.face_labels), layout.face_labels, take.rate)
     assert resting_time(bare, face, layout) == find_neutral(bare, layout.face_labels)
+
+
+def rest_and_smile(face, layout, jitter_mm, seed):
+    """Nearly two seconds of rest, then a smile, at 30 Hz: displacements from the true rest, and the take."""
+    smile = np.concatenate([np.zeros(55), np.linspace(0, 1, 12), np.ones(40)])
+    weights = np.zeros((len(smile), face.n_bases))
+    for name in ("mouthSmileLeft", "mouthSmileRight", "jawOpen"):
+        weights[:, face.names.index(name)] = smile
+    skin = layout.points(face) + np.tensordot(weights, layout.bases(face), axes=1)
+    noise = np.random.default_rng(seed).normal(0, jitter_mm / np.sqrt(3), skin.shape)
+    return Take(skin + noise, layout.face_labels, 30.0)
+
+
+@pytest.mark.parametrize("neutral_s", [0.6, 1.2, 1.7])
+def test_neutral_places_of_landmarks_that_jitter_are_means_of_a_longer_rest(face, layout, neutral_s):
+    def off(places):
+        return np.sqrt(((places - layout.points(face)) ** 2).sum(axis=1).mean())
+
+    short, steady = [], []
+    for seed in range(5):
+        take = rest_and_smile(face, layout, 2.0, seed)
+        short.append(off(neutral_places(take, layout.face_labels, neutral_s)[1]))
+        steady.append(off(steady_places(take, layout.face_labels, neutral_s)))
+    assert np.mean(short) > 1.0
+    assert np.mean(steady) < 0.75 * np.mean(short)
+
+
+def test_neutral_places_of_markers_that_keep_still_stay_what_they_are(face, layout):
+    take = rest_and_smile(face, layout, 0.3, 0)
+    short = neutral_places(take, layout.face_labels, 1.0)[1]
+    np.testing.assert_array_equal(steady_places(take, layout.face_labels, 1.0), short)

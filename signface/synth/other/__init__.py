@@ -1,0 +1,1 @@
+"""A second synthetic corpus, made by other rules than `signface.synth`: to test on, never to train on."""
