@@ -31,7 +31,8 @@ import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
 
-from benchmarks.real_pictures import draw_three
+from benchmarks.real_boundaries import judged_boundaries, judged_jitter, scored_boundaries
+from benchmarks.real_pictures import draw_boundaries, draw_three
 from benchmarks.real_scores import DRAWS, FRAME_S, interval, judged_labels, judged_sentences, macro_f1, value_codes
 from signface.channels.rules import find_channels, read_channels
 from signface.corpus.examples import solve_corpus
@@ -268,6 +269,10 @@ def krsl(here: Real, others: Real | None) -> list[Row]:
         if PICTURES is not None and how == RULE_BY_LEVEL:
             title = "Raised brows by the shipped rule (KRSL)"
             draw_three(found, ["br_raise"], PICTURES / "krsl-brows.png", signal="browInnerUp", title=title)
+    rows += boundaries("KRSL", what, judged, None if others is None else here_only("brows", ["br_raise"]))
+    if PICTURES is not None:
+        title = "Energies, the boundaries cut by them, and raised brows (KRSL)"
+        draw_boundaries(scored_boundaries(judged), PICTURES / "krsl-boundaries.png", title=title)
     leaks = leak(judged, measured)
     rows.append(Row("KRSL", "r of brows with pitch at rest", "", {n: (r, r, r) for n, r in leaks.items()}))
     for label, word in (("nod", "nod"), ("chin_up", "chin up"), ("turn_forward", "forward")):
@@ -287,6 +292,14 @@ def krsl(here: Real, others: Real | None) -> list[Row]:
     rows.append(
         Row("KRSL", "sentence type", "trees on courses", judged_labels(side_by_side(learnt_labels, typed, CLIPS)))
     )
+    return rows
+
+
+def boundaries(corpus: str, what: str, examples: list[Example], others: list[Example] | None) -> list[Row]:
+    """Where a face changes by its energies against where annotations begin and end; and what of it is jitter."""
+    rows = [Row(corpus, "jitter of the weights", "share of the motion of a take", judged_jitter(examples))]
+    for tolerance, way, values in judged_boundaries(examples, others):
+        rows.append(Row(corpus, f"boundaries of {what} within {tolerance}", way, values))
     return rows
 
 
@@ -343,9 +356,18 @@ def lse(here: Real, others: Real | None) -> list[Row]:
     found = side_by_side(learnt_segments, units, SENTENCES.changed(balanced=True))
     how = "boosting on action units and head"
     rows.append(Row("LSE", "found in sentences", how, judged_sentences(found, labels)))
+    mine = restricted(here.examples("lse", WEIGHTS, "CNM_tipo"), labels, unknown)
+    judged = None
+    if others is not None:
+        judged = restricted(others.examples("lse", WEIGHTS, "CNM_tipo"), labels, unknown)
+    what = "questions and negation"
+    rows += boundaries("LSE", what, mine if judged is None else judged, None if judged is None else mine)
     if PICTURES is not None:
         title = "Questions and negation by boosting on action units and head (LSE), signers left out"
         draw_three(found, labels, PICTURES / "lse-clauses.png", signal="AU01", title=title)
+        scored = scored_boundaries(mine if judged is None else judged)
+        title = "Energies, the boundaries cut by them, and questions and negation (LSE)"
+        draw_boundaries(scored, PICTURES / "lse-boundaries.png", title=title)
     return rows
 
 

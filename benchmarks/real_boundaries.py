@@ -2,6 +2,7 @@
 
 - `judged_boundaries`: boundaries found by `signface.segmentation.cutting.segment` against those of a tier, beside as
   many placed at random and evenly.
+- `scored_boundaries`: each take by itself.
 - `judged_jitter`: how much of the motion is jitter of the tracker.
 """
 
@@ -132,6 +133,21 @@ def _values(parts: np.ndarray) -> dict[str, tuple[float, float, float]]:
         }
     values |= {"at random": (float(random[0] * both[0]),) * 3, "evenly": (float(even[0] * both[0]),) * 3}
     return {**values, "of": (float(true[0]),) * 3}
+
+
+def scored_boundaries(examples: Sequence[Example]) -> list[tuple[float, Example]]:
+    """F1 of the boundaries within the larger tolerance, of takes that have annotated ones; worst first.
+
+    Takes in which nothing is found are not among them. Of equal takes the one with more boundaries is further out.
+    """
+    scored = []
+    for example in examples:
+        true, found = annotated_times(example), edges(example.descriptors)
+        if len(true) and len(found):
+            number = len(true) + len(found)
+            f1 = 2 * len(match_times(true, found, TOLERANCES[-1])) / number
+            scored.append((f1, number if f1 > 0.5 else -number, example.take, example))
+    return [(f1, example) for f1, *_, example in sorted(scored, key=lambda row: row[:3])]
 
 
 def judged_jitter(examples: Sequence[Example]) -> dict[str, tuple[float, float, float]]:

@@ -179,7 +179,7 @@ def warn_of_jitter(descriptors: Descriptors) -> None:
     if found.most:
         warnings.warn(
             f"{descriptors.name}: {found.share:.0%} of the motion is jitter of the tracker: boundaries of segments are "
-            "doubtful (--cutoff 4 takes more of it away)",
+            "doubtful (--cutoff 6 takes some of it away)",
             SignfaceWarning,
             stacklevel=2,
         )
