@@ -51,7 +51,7 @@ from signface.settings.solve import SolveSettings
 from signface.settings.training import TrainingSettings
 
 WEIGHTS, MEASURES, UNITS = SolveSettings(), SolveSettings(method="measures"), SolveSettings(read_as="aus")
-SENTENCES = TrainingSettings(classifier="boosting", features=("weights", "head"), normalise="range")
+SENTENCES = TrainingSettings(classifier="boosting", features=("weights", "head"), normalise="range", balanced=True)
 CLIPS = TrainingSettings(
     classifier="extra-trees",
     features=("weights", "head"),
@@ -285,7 +285,7 @@ def krsl(here: Real, others: Real | None) -> list[Row]:
             found = by_chosen_rule(weighed, label)
             rows.append(Row("KRSL", label, RULE_OF_OTHERS, judged_sentences(found, [label])))
         judged, folds = load(MEASURES, "head", [label])
-        found = side_by_side(learnt_segments, folds, SENTENCES.changed(balanced=True))
+        found = side_by_side(learnt_segments, folds, SENTENCES)
         rows.append(Row("KRSL", label, "boosting on measures and head", judged_sentences(found, [label])))
     judged, folds = load(MEASURES, "brows", ["br_raise"])
     typed = [tuple(whole(side, lambda e: e.kind) for side in fold) for fold in folds]
@@ -353,7 +353,7 @@ def lse(here: Real, others: Real | None) -> list[Row]:
         clips = CLIPS.changed(normalise="range")
         right = judged_labels(side_by_side(learnt_labels, given(folds), clips))
         rows.append(Row("LSE", "given segments, 3 classes", f"trees on courses of {how} and head", right))
-    found = side_by_side(learnt_segments, units, SENTENCES.changed(balanced=True))
+    found = side_by_side(learnt_segments, units, SENTENCES)
     how = "boosting on action units and head"
     rows.append(Row("LSE", "found in sentences", how, judged_sentences(found, labels)))
     mine = restricted(here.examples("lse", WEIGHTS, "CNM_tipo"), labels, unknown)

@@ -22,7 +22,7 @@ METHODS = {
     "rbf-network": "a radial basis function network learnt from examples of the avatar",
     "gaussian-process": "Gaussian process regression learnt from examples of the avatar",
     "sparse-online-gp": "its sparse online form",
-    "measures": "no weights: brows, lids and mouth measured from rest, mm",
+    "measures": "brows, lids and mouth measured from rest (mm), and one weight of the brows",
 }
 
 

@@ -22,6 +22,7 @@ from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.settings.solve import SolveSettings
 from signface.signer import Signer
+from signface.solver.measures import with_upright_brows
 from signface.solver.methods import make_solver
 from signface.solver.observability import unobserved_bases
 from signface.solver.preparation import Preparation, PreparedTake, prepare_take
@@ -156,7 +157,7 @@ def solve_pieces(
     for begin, end in progress(pieces(recording.n_frames, piece), "solving"):
         displacements, head = preparation.frames(begin, end)
         solution = solver.solve(displacements)
-        yield Descriptors(
+        solved = Descriptors(
             weights=solution.weights,
             names=solver.names,
             rate=recording.rate,
@@ -169,6 +170,7 @@ def solve_pieces(
             settings=settings,
             unobserved=unobserved,
         )
+        yield with_upright_brows(solved) if settings.method == "measures" else solved
 
 
 def face_and_layout(

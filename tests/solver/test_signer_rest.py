@@ -10,12 +10,14 @@ from pympi.Elan import Eaf
 from scipy.spatial.transform import Rotation
 
 import signface as sf
+from signface.channels.rules import read_channels
 from signface.face.layout import MarkerLayout
 from signface.signer import Signer
 from signface.signer_level import SignerRest, signer_level
-from signface.solver.measures import MEASURES, FaceMeasures
+from signface.solver.measures import BROWS_RAISED, LOWERED, MEASURES, PER_PITCH_DEG, RAISED, FaceMeasures
 from signface.solver.signer_rest import learn_signer, signer_rest
 from signface.solver.solving import solve
+from signface.solver.thin_shell import ThinShellSolver
 from signface.takes.reading import open_recording
 from signface.takes.rigid import apply, rigid_transforms
 from signface.takes.take import Take
@@ -107,14 +109,37 @@ def test_a_level_is_of_all_frames_alike():
 
 @given(raised=st.floats(0.1, 1.0))
 @settings(max_examples=10, deadline=None)
-def test_measures_are_linear_and_zero_at_rest(raised):
+def test_measures_in_millimetres_are_linear_and_zero_at_rest(raised):
     measures = FaceMeasures(FACE, LAYOUT)
-    assert measures.names == tuple(MEASURES)
+    assert measures.names == (*MEASURES, BROWS_RAISED)
     base = LAYOUT.bases(FACE)[FACE.names.index("browInnerUp")][None]
     one, scaled = measures.solve(base).weights, measures.solve(raised * base).weights
-    np.testing.assert_allclose(scaled, raised * one, atol=1e-12)
+    np.testing.assert_allclose(scaled[:, :-1], raised * one[:, :-1], atol=1e-12)
+    np.testing.assert_allclose(measures.solve(0 * base).weights, 0.0, atol=1e-6)
     assert one[0, measures.names.index("browInnerHeight")] > 3
     assert np.abs(one[0, measures.names.index("mouthWidth")]) < 0.2
+
+
+def test_raised_brows_are_measured_as_weights_solve_them():
+    measures, solver = FaceMeasures(FACE, LAYOUT), ThinShellSolver(FACE, LAYOUT)
+    for sign, names in ((1.0, RAISED), (-1.0, LOWERED)):
+        place = sum(LAYOUT.bases(FACE)[FACE.names.index(name)] for name in names)[None]
+        weights = dict(zip(solver.names, solver.solve(place).weights[0], strict=True))
+        expected = np.mean([weights[name] for name in RAISED]) - np.mean([weights[name] for name in LOWERED])
+        assert measures.solve(place).weights[0, -1] == pytest.approx(expected, abs=1e-9)
+        assert sign * expected > 0.5
+
+
+def test_brows_are_corrected_by_pitch_as_the_rule_of_the_channel_does():
+    assert read_channels()["brows"]["raised"]["signer"]["per_pitch_deg"] == PER_PITCH_DEG
+
+
+def test_without_brow_markers_raised_brows_are_no_measure():
+    brows = {f"L{number}" for number in range(17, 27)}
+    blind = LAYOUT.restricted([label for label in LAYOUT.labels if label not in brows])
+    names = FaceMeasures(FACE, blind).names
+    assert BROWS_RAISED not in names
+    assert "mouthWidth" in names
 
 
 def test_a_missing_landmark_takes_only_its_own_measures():
