@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from signface.cli.main import main
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError, SignfaceWarning
 from signface.metrics.segmentation import boundary_f1
@@ -176,3 +177,15 @@ def test_a_take_without_jitter_is_cut_as_if_nobody_looked_for_any():
         one, other = (segment(take, jitter_factor=factor).table for factor in (0.0, 3.0))
         assert one["kind"].tolist() == other["kind"].tolist()
         np.testing.assert_allclose(one["start_s"], other["start_s"], atol=0.005)
+
+
+def test_the_command_says_the_share_and_warns_of_most(tmp_path, capsys):
+    for name, deviation, warned in (("steady", 0.0005, False), ("shaken", 0.1, True)):
+        take, _ = shaken(moving_face(faces(number=3), rate=30, hold=1.5)[0], deviation)
+        table = take.to_frame().assign(residual_mm=0.0)
+        table.insert(0, "time_s", take.time)
+        table.to_csv(tmp_path / f"{name}.csv", index=False)
+        assert main(["segment", str(tmp_path / f"{name}.csv"), "-o", str(tmp_path / "segments.csv")]) in (None, 0)
+        said = capsys.readouterr()
+        assert "% of the motion" in said.out
+        assert ("boundaries of segments are doubtful" in said.err) == warned
