@@ -167,10 +167,19 @@ class Annotation(Content):
 
     @property
     def vocabulary(self) -> Vocabulary:
-        """What the labels stand for."""
+        """What the labels stand for; with `unknown`, where the model abstained."""
+        from signface.label.familiarity import UNKNOWN
         from signface.label.vocabulary import AFFECT
 
-        return AFFECT if self.card is None else self.card.vocabulary
+        vocabulary = AFFECT if self.card is None else self.card.vocabulary
+        return vocabulary.including(UNKNOWN) if (self.segments.table["label"] == UNKNOWN).any() else vocabulary
+
+    @property
+    def unlike(self) -> str:
+        """That the take is unlike what the model knows, in words; empty where it is like it, or nothing tells."""
+        from signface.label.familiarity import UNLIKE
+
+        return next((step for step in self.segments.history if step.startswith(UNLIKE)), "")
 
     @cached_property
     def curves(self) -> pd.DataFrame:
@@ -202,11 +211,11 @@ class Annotation(Content):
     def facts(self) -> dict[str, str]:
         """What the header of an EAF says of it: `model`, `take`, `residual_mm`.
 
-        And, where there are any, the bases that the markers cannot see (`unobserved`) and the values of channels that
-        they cannot show (`unseen`).
+        And, where there are any, the bases that the markers cannot see (`unobserved`), the values of channels that
+        they cannot show (`unseen`), and that the take is unlike what the model knows (`unlike`).
         """
         residual = "unknown" if self.residual_mm is None else f"{self.residual_mm:.2f}"
-        more = {"unobserved": joined_sides(self.descriptors.unobserved), "unseen": self._unseen}
+        more = {"unobserved": joined_sides(self.descriptors.unobserved), "unseen": self._unseen, "unlike": self.unlike}
         told = {name: text for name, text in more.items() if text}
         return {"model": self.model, "take": self.name, "residual_mm": residual, **told}
 
@@ -243,6 +252,7 @@ class Annotation(Content):
         blind = joined_sides(self.descriptors.unobserved)
         fit += f"; no marker shows {blind}" if blind else ""
         fit += f"; cannot be seen: {self._unseen}" if self.unseen else ""
+        fit += f"; the take is {self.unlike}" if self.unlike else ""
         return f"{duration}, {counted(len(stable), 'stable segment')}: {', '.join(labels) or 'none'}{fit}"
 
     def _repr_html_(self) -> str:

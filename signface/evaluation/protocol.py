@@ -20,6 +20,7 @@ import pandas as pd
 from signface.channels.rules import find_intensities
 from signface.errors import SignfaceError
 from signface.label.calibration import brier_score, expected_calibration_error
+from signface.label.familiarity import UNKNOWN
 from signface.label.intensity import IntensityClassifier
 from signface.label.labelling import find_segments, label_segments, label_spans
 from signface.label.model import TrainedModel
@@ -389,6 +390,8 @@ def _scores(sections: dict[str, pd.DataFrame], vocabulary: Vocabulary, seed: int
         labels = list(vocabulary.values)
         if section == "frames" and vocabulary.transitions:
             labels.append(TRANSITION)
+        if (judged["found"] == UNKNOWN).any():
+            labels.append(UNKNOWN)
         result = classification_metrics(judged["truth"].tolist(), judged["found"].tolist(), labels)
         hits = (judged["truth"] == judged["found"]).tolist()
         result["accuracy_interval"] = accuracy_interval(hits, judged["take"].tolist(), seed=seed)

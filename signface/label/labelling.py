@@ -18,6 +18,7 @@ import pandas as pd
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.label.courses import segment_courses
+from signface.label.familiarity import abstained
 from signface.label.model import TrainedModel
 from signface.label.spans import frames_within, segment_means
 from signface.label.vocabulary import Vocabulary
@@ -176,7 +177,8 @@ def find_segments(descriptors: Descriptors, model: TrainedModel, *, level: Signe
     """The labelled segments of a take.
 
     A sequence model finds them itself; for the others the take is cut by `signface.segmentation.cutting.segment` and
-    labelled by `label_segments`. The columns are the same, and neighbours have unequal labels.
+    labelled by `label_segments`. The columns are the same, and neighbours have unequal labels. In a take that is unlike
+    the model's training, what it would name is called unknown (`signface.label.familiarity`).
 
     Raises
     ------
@@ -184,7 +186,7 @@ def find_segments(descriptors: Descriptors, model: TrainedModel, *, level: Signe
         The model was trained on other bases, or no frame has weights.
     """
     if not model.sequential:
-        return label_segments(descriptors, segment(descriptors), model, level=level)
+        return abstained(descriptors, label_segments(descriptors, segment(descriptors), model, level=level), model)
     segments = model.estimator.annotate(model.seen(descriptors, level))
     table = segments.table.copy()
     stable = (table["kind"] == "stable").to_numpy()
@@ -196,6 +198,7 @@ def find_segments(descriptors: Descriptors, model: TrainedModel, *, level: Signe
     if not model.card.vocabulary.transitions:
         table = without_transitions(table)
     labelled = segments.changed(f"find_segments {model.name} ({model.card.classifier})", table)
+    labelled = abstained(descriptors, labelled, model)
     return labelled if model.intensity is None else model.intensity.annotate(descriptors, labelled)
 
 

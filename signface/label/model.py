@@ -59,6 +59,8 @@ class Card:
         is not calibrated.
     version : str
         Version of signface that trained it.
+    familiarity : mapping
+        What tells whether a take is like the training (`signface.label.familiarity`); empty where nothing does.
     vocabulary : Vocabulary
         What the labels stand for, and which of them there could be.
     tier : str
@@ -92,6 +94,7 @@ class Card:
     solve: Mapping[str, Any] = field(default_factory=dict)
     vocabulary: Vocabulary = AFFECT
     tier: str = "affect"
+    familiarity: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, repr=False)

@@ -194,6 +194,8 @@ def _card(content: dict[str, Any]) -> Card:
     card = Card(**values)
     if not (isinstance(card.bases, tuple) and isinstance(card.labels, tuple) and isinstance(card.scores, dict)):
         raise ValueError("the card's lists are no lists")
+    if card.familiarity and not all(isinstance(of, dict) for of in card.familiarity.values()):
+        raise ValueError("the card's familiarity is no table")
     if card.calibration and not all(isinstance(card.calibration.get(name), float) for name in ("slope", "offset")):
         raise ValueError("the card's calibration is no line")
     try:

@@ -180,6 +180,10 @@ class RecurrentLabeller(TakeLabeller):
         marks = expit(outputs[:, :, held + 2 :]).mean(axis=0)
         return np.column_stack([states[:, :held], states[:, held:].sum(axis=1)]), marks
 
+    def strangeness(self, take: Descriptors) -> float:
+        """Mean square of a take's features, standardised as those of the training: about 1 for takes like those."""
+        return float(np.mean(standardised(self._seen(take), self.mean_, self.scale_).astype(float) ** 2))
+
     def _mirrored(self) -> np.ndarray:
         """(N,) where each feature stands in the mirror image of a face: left and right change places."""
         swapped = [name.replace("Left", "\0").replace("Right", "Left").replace("\0", "Right") for name in self.bases_]
