@@ -24,7 +24,9 @@ from benchmarks.generalisation import make_rows, measure, table
 from signface.errors import SignfaceError
 from signface.evaluation.protocol import score_model
 from signface.files import whole_file
-from signface.label.model import Card
+from signface.label.familiarity import fit_familiarity, measures
+from signface.label.labelling import find_segments
+from signface.label.model import Card, TrainedModel
 from signface.label.persistence import save_model
 from signface.label.vocabulary import AFFECT
 from signface.learn.training import Example, train
@@ -34,12 +36,15 @@ from signface.settings.solve import SolveSettings
 from signface.settings.training import TrainingSettings
 from signface.solver.solving import solve
 from signface.synth.corpus import TakeRequest, make_take, plan_corpus
+from signface.synth.other.corpus import OtherRequest, make_other_take, plan_other
 from signface.synth.variety import varied_take
 
 #: Signers and seed of the corpus that is trained on, and how often each of its takes is acted and recorded otherwise.
 SIGNERS, SEED, COPIES = 12, 301, 2
 #: Signers and seed of the corpus that is measured on.
 TEST_SIGNERS, TEST_SEED = 2, 0
+#: Seed of the takes by which a model learns what it knows: of nobody trained on or measured on.
+FAMILIAR_SEED = 5552
 #: Share of varied takes whose neutral frame is told rather than found.
 TOLD = 0.25
 #: Underscores in the name of a take as it is; a variation has one more.
@@ -107,6 +112,37 @@ def example_of(request: TakeRequest, copy: int) -> Example | None:
         reference=made.reference,
         sentence=request.sentence,
     )
+
+
+def strange_example(request: OtherRequest, tracked: bool) -> Example:
+    """A take of the second generator, its landmarks solved or its weights as they truly are."""
+    made = make_other_take(request)
+    descriptors = solve(made.take, settings=SolveSettings(layout="default-40")) if tracked else made.avatar_weights
+    return Example(request.name, request.signer_name, request.kind, replace(descriptors, head=None), made.reference)
+
+
+def takes_to_know_by(*, workers: int = 2) -> tuple[list[Example], list[Example]]:
+    """Takes like the training, as they are and varied, and takes that are not: by none of them was the model trained.
+
+    What is unlike is the second generator's. Nothing of it teaches a label.
+    """
+    from joblib import Parallel, delayed
+
+    of_one = plan_corpus(signers=1, seed=FAMILIAR_SEED)
+    known = examples_of([(r, AS_IT_IS) for r in of_one] + [(r, 0) for r in of_one], workers=workers)
+    others = [r for r in plan_other(signers=4, seed=FAMILIAR_SEED, kinds=["EU"]) if r.number < 8]
+    strange = Parallel(n_jobs=workers)(
+        delayed(strange_example)(request, tracked) for tracked in (True, False) for request in others
+    )
+    return known, strange
+
+
+def with_familiarity(model: TrainedModel, known: list[Example], strange: list[Example]) -> TrainedModel:
+    """The model with what tells takes like its training from others (`signface.label.familiarity`)."""
+    told = [
+        [measures(e.descriptors, find_segments(e.descriptors, model), model) for e in of] for of in (known, strange)
+    ]
+    return replace(model, card=replace(model.card, familiarity=fit_familiarity(*told)))
 
 
 def build(name: str, training: list[Example], test: list[Example]) -> None:

@@ -12,6 +12,7 @@ from signface.cli.main import main
 from signface.corpus.examples import solve_corpus
 from signface.corpus.manifest import read_corpus
 from signface.face.layout_files import read_layout
+from signface.label.persistence import read_card
 from signface.label.vocabulary import AFFECT
 from signface.synth.other.acting import follow, wander
 from signface.synth.other.corpus import OtherRequest, make_other_take, plan_other
@@ -30,9 +31,11 @@ def test_it_borrows_nothing_of_the_first_generator_but_the_writing_of_files():
     assert {name for name in borrowed if not name.startswith("signface.synth.other")} == {"signface.synth.corpus"}
 
 
-def test_nothing_that_trains_knows_it():
-    for path in [*(REPOSITORY / "models").glob("build_*.py"), REPOSITORY / "signface" / "synth" / "variety.py"]:
-        assert "synth.other" not in path.read_text(encoding="utf-8")
+def test_no_classifier_that_ships_was_trained_on_it():
+    made = {request.name for request in plan_other(signers=30)}
+    for path in (REPOSITORY / "models" / "classifiers").glob("*.skops"):
+        assert not made & {take[: len("P1_EU_01")] for take in read_card(path).takes}, path
+    assert "synth.other" not in (REPOSITORY / "signface" / "synth" / "variety.py").read_text(encoding="utf-8")
 
 
 def test_a_take_depends_on_its_seed_and_name_only():
