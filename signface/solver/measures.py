@@ -4,10 +4,10 @@
 - `with_upright_brows`: brows as they would stand with the head upright.
 
 Blendshapes read a face as expressions that an avatar can make; fifty of them from a tracker's noisy landmarks are more
-than a classifier of few signers can use. What linguists measure by hand is often enough for it, but for the brows: their
-distance from the eyes leaks the head's pitch, and what the whole face says of them, solved to weights, leaks it less.
-The two sides of a face are taken together, so that a turn of the head that a tracker takes for a crooked face cancels
-out.
+than a classifier of few signers can use. What linguists measure by hand is often enough for it, but for the brows:
+their distance from the eyes leaks the head's pitch, and what the whole face says of them, solved to weights, leaks it
+less. The two sides of a face are taken together, so that a turn of the head that a tracker takes for a crooked face
+cancels out.
 """
 
 from __future__ import annotations
