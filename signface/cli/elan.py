@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 EXAMPLE = """  signface elan check corrected/*.eaf
   signface elan map lab.etf -o mapping.toml
+  signface elan map annotated/*.eaf -o mapping.toml
   signface elan learn corpora/mine -o mine.skops
   signface elan agree eva.eaf tom.eaf -o agreement/
   signface elan install-recogniser --elan /opt/ELAN_7-0"""
@@ -33,6 +34,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             name, help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=f"example: {example}"
         )
 
+    def add_mapping(parser: argparse.ArgumentParser) -> None:
+        words = "annotators' tiers and labels are those of this .toml, and are read as ours"
+        parser.add_argument("--mapping", type=Path, metavar="FILE", help=words)
+
     check = action("check", "say what is wrong with EAF files", "signface elan check corrected/*.eaf")
     check.add_argument("files", nargs="+", type=Path, metavar="EAF")
     check.add_argument(
@@ -40,9 +45,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
     mapping = action(
-        "map", "write a first mapping file for a lab's template", "signface elan map lab.etf -o mapping.toml"
+        "map",
+        "write a first mapping file for a lab's template or annotations",
+        "signface elan map annotated/*.eaf -o mapping.toml",
     )
-    mapping.add_argument("template", type=Path, metavar="ETF_OR_EAF")
+    mapping.add_argument("templates", nargs="+", type=Path, metavar="ETF_OR_EAF", help="or a folder of them")
     mapping.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="a .toml file")
 
     learn = action(
@@ -62,6 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--with", dest="others", action="append", default=[], type=Path, metavar="CORPUS",
         help="train on this corpus as well; may be repeated",
     )  # fmt: skip
+    add_mapping(learn)
     add_settings_arguments(learn, TrainingSettings)
     add_solve_arguments(learn)
 
@@ -83,6 +91,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--same", action="append", default=[], type=parameters, metavar="OLD=NEW,...",
         help="tiers and labels that mean the same: br_raise=raised,brows@K01=brows@S1; may be repeated",
     )  # fmt: skip
+    add_mapping(agree)
     agree.add_argument("--gamma", action="store_true", help="compute gamma too (slow)")
     agree.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="also write tables (.csv) and pictures")
 
@@ -133,9 +142,9 @@ def check_files(arguments: argparse.Namespace) -> int:
 def map_template(arguments: argparse.Namespace) -> None:
     """Write a first mapping file."""
     from signface.channels.rules import closed_vocabularies, read_channels
-    from signface.elan.mapping import write_mapping
+    from signface.elan.mapping_draft import write_mapping
 
-    write_mapping(arguments.template, arguments.output, channels=closed_vocabularies(read_channels()))
+    write_mapping(arguments.templates, arguments.output, channels=closed_vocabularies(read_channels()))
     print(f"{arguments.output}: written; look through it before it is used")
 
 
@@ -143,6 +152,7 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
     """Show the corrections, compare before and after on takes held out, train on all and save."""
     from signface.corpus.examples import solve_corpus
     from signface.corpus.manifest import read_corpus
+    from signface.elan.mapping import read_mapping
     from signface.elan.reference import corpus_corrections
     from signface.evaluation.corrections import compare_corrections
     from signface.label.persistence import load_model, read_card, save_model
@@ -151,7 +161,8 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
     vocabulary = card.vocabulary.without_blank()
     corpus = read_corpus(arguments.corpus)
     files = [(entry.annotation, entry.signer) for entry in corpus if entry.annotation is not None]
-    tables = corpus_corrections(files, tier=card.tier, vocabulary=vocabulary)
+    mapping = None if arguments.mapping is None else read_mapping(arguments.mapping)
+    tables = corpus_corrections(files, tier=card.tier, vocabulary=vocabulary, mapping=mapping)
     for line in compare_corrections(tables):
         print(line)
     if arguments.output is None:
@@ -168,7 +179,15 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
         count = sum(entry.annotation is not None for entry in takes)
         shown = partial(progress, what="solving", total=count)
         sparse = not card.vocabulary.blank
-        return solve_corpus(takes, settings=solve, tier=card.tier, vocabulary=vocabulary, sparse=sparse, progress=shown)
+        return solve_corpus(
+            takes,
+            settings=solve,
+            tier=card.tier,
+            vocabulary=vocabulary,
+            sparse=sparse,
+            mapping=mapping,
+            progress=shown,
+        )
 
     learnt = learn_corrections(
         solved(arguments.corpus),
@@ -189,7 +208,7 @@ def compare_annotators(arguments: argparse.Namespace) -> None:
     from signface.elan.reference import read_annotators
     from signface.metrics.tiers import compare_tiers, renamed
 
-    annotators = read_annotators(arguments.files)
+    annotators = read_annotators(arguments.files, mapping=arguments.mapping)
     same = {old: str(new) for pairs in arguments.same for old, new in pairs.items()}
     if same:
         annotators = renamed(annotators, same)

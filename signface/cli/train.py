@@ -15,6 +15,7 @@ from signface.settings.training import TrainingSettings
 EXAMPLE = """  signface train corpora/feel -o mine.skops
   signface train corpora/feel -o mine.skops --classifier svm-rbf --kinds IE,SE --signer each
   signface train corpora/lab -o brows.skops --tier brows --vocabulary brows.txt
+  signface train corpora/lab -o brows.skops --tier brows --mapping lab.toml
   signface train corpora/feel -o mine.skops --normalise signer --features weights,windows --search"""
 
 
@@ -30,6 +31,12 @@ def add_tier_arguments(parser: argparse.ArgumentParser) -> None:
         help="its labels: a .txt with one a line, or the .eaf, .etf or .ecv that has them (default: the tier's own)",
     )
     parser.add_argument(
+        "--mapping",
+        type=Path,
+        metavar="FILE",
+        help="annotators' tiers and labels are those of this .toml (signface elan map); --tier is then ours",
+    )
+    parser.add_argument(
         "--sparse",
         action="store_true",
         help="only if what is not annotated was not looked at; the model then never says none",
@@ -43,7 +50,12 @@ def tier_options(arguments: argparse.Namespace) -> dict[str, Any]:
         from signface.elan.vocabularies import read_vocabulary
 
         vocabulary = read_vocabulary(arguments.vocabulary)
-    return {"tier": arguments.tier, "vocabulary": vocabulary, "sparse": arguments.sparse}
+    mapping = None
+    if arguments.mapping is not None:
+        from signface.elan.mapping import read_mapping
+
+        mapping = read_mapping(arguments.mapping)
+    return {"tier": arguments.tier, "vocabulary": vocabulary, "sparse": arguments.sparse, "mapping": mapping}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

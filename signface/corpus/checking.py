@@ -23,6 +23,7 @@ from signface.corpus.describing import face_for, layout_for, read_entry, recipe_
 from signface.corpus.manifest import TakeEntry, find_manifest, read_rows
 from signface.corpus.origin import Recipe, content_digest, make_recipe, take_name
 from signface.descriptors import Descriptors
+from signface.elan.translation import MappingOrFile, as_mapping, translated
 from signface.errors import SignfaceError, counted
 from signface.settings.solve import SolveSettings
 
@@ -67,6 +68,7 @@ class TakeCheck:
     tier: str = "affect"
     vocabulary: Vocabulary | None = None
     sparse: bool = False
+    mapping: MappingOrFile | None = None
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,7 @@ def check_corpus(
     tier: str = "affect",
     vocabulary: Vocabulary | None = None,
     sparse: bool = False,
+    mapping: MappingOrFile | None = None,
     workers: int | None = None,
     progress: Callable[[Iterable, int], Iterable] = lambda items, total: items,
 ) -> CheckedCorpus:
@@ -104,7 +107,7 @@ def check_corpus(
         The folder of the corpus or its `takes.csv`.
     settings : SolveSettings, optional
         As in `signface.corpus.running.run_corpus`.
-    tier, vocabulary, sparse : optional
+    tier, vocabulary, sparse, mapping : optional
         As in `signface.corpus.examples.solve_corpus`.
     workers : int, optional
         Takes looked at at the same time; one for each core by default.
@@ -129,6 +132,7 @@ def check_corpus(
     problems = [f"{file}: {problem}" for problem in rows]
     problems += _problems_of_names(file, entries)
     signers = frozenset(entry.signer for entry in entries)
+    rules = None if mapping is None else as_mapping(mapping)
     known: dict[tuple[str, str | None], Recipe] = {}
     checks = []
     for number, entry in enumerate(entries):
@@ -137,7 +141,7 @@ def check_corpus(
         except SignfaceError as error:
             problems.append(f"{entry.path}: {error}")
             solved_as = recipe
-        checks.append(TakeCheck(number, entry, solved_as, signers, tier, vocabulary, sparse))
+        checks.append(TakeCheck(number, entry, solved_as, signers, tier, vocabulary, sparse, rules))
     looked_at: dict[int, CheckedTake] = {}
     results = on_cores(check_take, checks, workers=min(workers or os.cpu_count() or 1, max(1, len(checks))))
     for check, result in progress(results, len(checks)):
@@ -265,12 +269,14 @@ def _problems_of_reference(check: TakeCheck, span: tuple[float, float] | None) -
     from signface.elan.reference import read_reference, read_tiers, reference_vocabulary
     from signface.label.vocabulary import AFFECT, NONE, Vocabulary
 
-    entry, tier = check.entry, check.tier
+    entry, tier, mapping = check.entry, check.tier, check.mapping
     file = entry.annotation
     assert file is not None
     problems = []
     try:
         tiers = read_tiers(file)
+        if mapping is not None:
+            tiers = translated({file.name: tiers}, mapping)[file.name]
         annotators = {name.removeprefix(f"{tier}@") for name in tiers if name.startswith(f"{tier}@")}
         strangers = sorted(annotators - check.signers)
         problems += [f"{file}: its tier {tier}@{name} is of a signer who is not in takes.csv" for name in strangers]
@@ -278,12 +284,12 @@ def _problems_of_reference(check: TakeCheck, span: tuple[float, float] | None) -
         annotated = () if rows is None else tuple(dict.fromkeys(rows["label"].str.strip()))
         vocabulary = check.vocabulary
         if vocabulary is None and (annotated or tier == "affect"):
-            vocabulary = reference_vocabulary([(file, entry.signer)], tier)
+            vocabulary = reference_vocabulary([(file, entry.signer)], tier, mapping=mapping)
         if vocabulary is not None and not (check.sparse or vocabulary.transitions):
             vocabulary = vocabulary.including(NONE)
         foreign = [label for label in annotated if vocabulary is not None and label not in vocabulary.allowed]
         try:
-            reference = read_reference(file, entry.signer, tier=tier, vocabulary=vocabulary)
+            reference = read_reference(file, entry.signer, tier=tier, vocabulary=vocabulary, mapping=mapping)
         except SignfaceError:
             if not foreign:
                 raise
@@ -293,9 +299,10 @@ def _problems_of_reference(check: TakeCheck, span: tuple[float, float] | None) -
                 f"vocabulary. Stable labels are {' '.join(vocabulary.values)}"
                 + ("; transitions join two of them, as NA" if vocabulary == AFFECT else "")
             )
-            reference = read_reference(file, entry.signer, tier=tier, vocabulary=Vocabulary("annotated", annotated))
+            said = Vocabulary("annotated", annotated)
+            reference = read_reference(file, entry.signer, tier=tier, vocabulary=said, mapping=mapping)
     except SignfaceError as error:
-        return [*problems, str(error)]
+        return [*problems, str(error) if error.file is not None else f"{file}: {error}"]
     table = reference.table
     whole = vocabulary is not None and vocabulary.transitions  # elsewhere, moments in which nothing happens are empty
     if not len(table):

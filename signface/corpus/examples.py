@@ -16,6 +16,7 @@ from signface.corpus.origin import Origin, Recipe, find_origin, make_recipe
 from signface.corpus.signers import find_signer, warn_of_unknown_rests
 from signface.corpus.store import DescriptorStore, open_store
 from signface.descriptors import Descriptors
+from signface.elan.translation import MappingOrFile
 from signface.errors import SignfaceError, SignfaceWarning
 from signface.label.vocabulary import NONE, Vocabulary
 from signface.learn.examples import Example
@@ -33,6 +34,7 @@ def solve_corpus(
     tier: str = "affect",
     vocabulary: Vocabulary | None = None,
     sparse: bool = False,
+    mapping: MappingOrFile | None = None,
     workers: int = WORKERS,
     progress: Callable[[Iterable[Descriptors]], Iterable[Descriptors]] = iter,
 ) -> list[Example]:
@@ -55,6 +57,9 @@ def solve_corpus(
         What is not annotated was not looked at, and takes in which nothing is annotated are passed over with a
         `SignfaceWarning`. Otherwise, on a tier whose vocabulary has no transitions, it is `none`, which is added to the
         vocabulary: an empty tier is a take in which nothing happened.
+    mapping : mapping or path, optional
+        Of our channels and labels to the laboratory's tiers and values (`signface.elan.mapping`): `tier` is then ours,
+        and so are the labels that are learnt.
     workers : int
         Takes solved at the same time, each in a process of its own.
     progress : callable, optional
@@ -94,7 +99,7 @@ def solve_corpus(
     store = open_store(corpus.folder)
     recipe = make_recipe(settings)
     known: dict[tuple[str, str | None], Recipe] = {}
-    entries, references, vocabulary = _references(entries, tier, vocabulary, sparse)
+    entries, references, vocabulary = _references(entries, tier, vocabulary, sparse, mapping)
     origins = [find_origin(entry, corpus.folder, recipe_of(entry, recipe, known)) for entry in entries]
     named = tier.partition("@")[0]
     blank = not (sparse or vocabulary.transitions)
@@ -121,19 +126,23 @@ def solve_corpus(
 
 
 def _references(
-    entries: list[TakeEntry], tier: str, vocabulary: Vocabulary | None, sparse: bool
+    entries: list[TakeEntry],
+    tier: str,
+    vocabulary: Vocabulary | None,
+    sparse: bool,
+    mapping: MappingOrFile | None,
 ) -> tuple[list[TakeEntry], list[Segments], Vocabulary]:
     """The takes that say something, the reference of each, and their vocabulary."""
     from signface.elan.reference import read_reference, reference_vocabulary
 
     files = [(entry.annotation, entry.signer) for entry in entries if entry.annotation is not None]
     if vocabulary is None:
-        vocabulary = reference_vocabulary(files, tier)
+        vocabulary = reference_vocabulary(files, tier, mapping=mapping)
     blank = not (sparse or vocabulary.transitions)
     readable = vocabulary.including(NONE) if blank else vocabulary
     kept = []
     for entry, (file, signer) in zip([entry for entry in entries if entry.annotation is not None], files, strict=True):
-        reference = read_reference(file, signer, tier=tier, vocabulary=readable)
+        reference = read_reference(file, signer, tier=tier, vocabulary=readable, mapping=mapping)
         if blank:  # what is called none is what is not annotated: one segment with the gaps beside it
             shown = reference.table[reference.table["label"] != NONE].reset_index(drop=True)
             kept.append(

@@ -9,7 +9,7 @@ Reading
 What a tier holds
     `tiers.Tier`, `tiers.label_tier`, `tiers.doubtful_tier`, `channels.channel_tiers`, `vocabularies.read_vocabulary`
 A lab's own tiers
-    `mapping.read_mapping`, `mapping.suggest_mapping`
+    `mapping.read_mapping`, `mapping_draft.write_mapping`, `translation.translated`
 Run by ELAN
     `recogniser.write_extension`
 """

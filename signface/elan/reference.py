@@ -23,6 +23,7 @@ from signface.elan.checking import check_document
 from signface.elan.document import CHANNEL_PREFIX, Row, read_document, recorded, tier_rows
 from signface.elan.frame_labels import frame_label_document, is_frame_labels
 from signface.elan.tiers import clean_name, tier_name
+from signface.elan.translation import MappingOrFile, as_mapping, tier_meanings, translated
 from signface.elan.vocabularies import vocabulary_of_tier
 from signface.errors import SignfaceError, SignfaceWarning
 from signface.label.vocabulary import AFFECT, INTENSITY, NONE, Vocabulary
@@ -30,7 +31,12 @@ from signface.segmentation.segments import Segments
 
 
 def read_reference(
-    eaf: str | PathLike[str], signer: str | None = None, *, tier: str = "affect", vocabulary: Vocabulary | None = None
+    eaf: str | PathLike[str],
+    signer: str | None = None,
+    *,
+    tier: str = "affect",
+    vocabulary: Vocabulary | None = None,
+    mapping: MappingOrFile | None = None,
 ) -> Segments:
     """Read the reference annotation of one signer.
 
@@ -46,6 +52,9 @@ def read_reference(
     vocabulary : Vocabulary, optional
         The labels allowed. By default those of affect (`signface.label.vocabulary.AFFECT`) on a tier of affect, those
         of its closed vocabulary on another tier, and what it holds where it has none.
+    mapping : mapping or path, optional
+        Of our channels and labels to the laboratory's tiers and values (`signface.elan.mapping`): `tier` is then ours,
+        and so are the labels returned.
 
     Returns
     -------
@@ -80,12 +89,13 @@ def read_reference(
     """
     file = Path(eaf)
     root = _root(file)
-    name = _tier_name(root, tier, signer, file)
+    meanings = _meanings(root, mapping)
+    name = _tier_name(root, tier, signer, file, meanings)
     _fill_times(root)
     tiers = tier_rows(root)
-    meaning = channel_labels(root).get(name, ("", {}))[1]
+    meaning = meanings[name][2] if name in meanings else {}
     if vocabulary is None:
-        vocabulary = AFFECT if tier == "affect" else _vocabulary_of(root, name, tiers[name], file)
+        vocabulary = AFFECT if tier == "affect" else _vocabulary_of(root, name, tiers[name], file, meaning)
     rows = _checked_rows(tiers[name], name, meaning, vocabulary, file)
     history = [f"read_reference {file.name} {name}"]
     if not vocabulary.transitions and (merged := _merged(rows)) != rows:
@@ -100,7 +110,9 @@ def read_reference(
     return Segments(table, name=file.stem, history=tuple(history))
 
 
-def reference_vocabulary(files: Sequence[tuple[str | PathLike[str], str | None]], tier: str) -> Vocabulary:
+def reference_vocabulary(
+    files: Sequence[tuple[str | PathLike[str], str | None]], tier: str, *, mapping: MappingOrFile | None = None
+) -> Vocabulary:
     """The vocabulary that the references of a corpus share on a tier.
 
     That of the tier's linguistic type, if all files have the same; else one of all values that are annotated, with a
@@ -111,6 +123,8 @@ def reference_vocabulary(files: Sequence[tuple[str | PathLike[str], str | None]]
     files : sequence of (path, str or None)
         Each annotation, and its signer.
     tier : str
+    mapping : mapping or path, optional
+        As for `read_reference`.
 
     Raises
     ------
@@ -121,13 +135,16 @@ def reference_vocabulary(files: Sequence[tuple[str | PathLike[str], str | None]]
         return AFFECT
     closed: list[Vocabulary] = []
     labels: dict[str, list[Path]] = {}
+    mapping = as_mapping(mapping)
     for eaf, signer in files:
         file = Path(eaf)
         root = _root(file)
-        name = _tier_name(root, tier, signer, file)
-        vocabulary = vocabulary_of_tier(root, name, file)
+        meanings = _meanings(root, mapping)
+        name = _tier_name(root, tier, signer, file, meanings)
+        meaning = meanings[name][2] if name in meanings else {}
+        vocabulary = None if meaning else vocabulary_of_tier(root, name, file)
         closed += [] if vocabulary is None else [vocabulary]
-        for label in {value.strip() for _, _, value in tier_rows(root)[name]} - {""}:
+        for label in {meaning.get(value.strip(), value.strip()) for _, _, value in tier_rows(root)[name]} - {""}:
             labels.setdefault(label, []).append(file)
     if len(closed) == len(files) and len({(one.values, one.transitions) for one in closed}) == 1:
         return max(closed, key=lambda one: len(one.colours))  # not every file has its colours beside it
@@ -173,18 +190,27 @@ def read_tiers(eaf: str | PathLike[str]) -> dict[str, pd.DataFrame]:
     return {name: _table([row for row in rows[name] if row[2].strip()]) for name in independent}
 
 
-def read_annotators(files: Sequence[str | PathLike[str]]) -> dict[str, dict[str, pd.DataFrame]]:
+def read_annotators(
+    files: Sequence[str | PathLike[str]], *, mapping: MappingOrFile | None = None
+) -> dict[str, dict[str, pd.DataFrame]]:
     """The tiers of several annotators' files of one take; errors are those of `read_tiers`.
 
-    Each stands under the stem of its file, or under its path where two stems are equal.
+    Each stands under the stem of its file, or under its path where two stems are equal; with our names of tiers and
+    labels where a mapping gives them (`signface.elan.translation.translated`).
     """
     stems = [Path(file).stem for file in files]
     names = stems if len(set(stems)) == len(stems) else [str(file) for file in files]
-    return {name: read_tiers(file) for name, file in zip(names, files, strict=True)}
+    annotators = {name: read_tiers(file) for name, file in zip(names, files, strict=True)}
+    return annotators if mapping is None else translated(annotators, mapping)
 
 
 def read_corrections(
-    eaf: str | PathLike[str], signer: str | None = None, *, tier: str = "affect", vocabulary: Vocabulary | None = None
+    eaf: str | PathLike[str],
+    signer: str | None = None,
+    *,
+    tier: str = "affect",
+    vocabulary: Vocabulary | None = None,
+    mapping: MappingOrFile | None = None,
 ) -> tuple[pd.DataFrame, pd.DataFrame] | None:
     """A tier as signface wrote it and as it is now: two tables `start_s, end_s, label`.
 
@@ -193,14 +219,15 @@ def read_corrections(
     """
     file = Path(eaf)
     root = _root(file)
-    name = _tier_name(root, tier, signer, file)
+    meanings = _meanings(root, mapping)
+    name = _tier_name(root, tier, signer, file, meanings)
     written = recorded(root).get(name)
     if written is None:
         return None
-    meaning = channel_labels(root).get(name, ("", {}))[1]
+    meaning = meanings[name][2] if name in meanings else {}
     before = _table([(start, end, meaning.get(value, value)) for start, end, value in written])
-    after = read_reference(file, signer, tier=tier, vocabulary=vocabulary).table[["start_s", "end_s", "label"]]
-    return before, after
+    after = read_reference(file, signer, tier=tier, vocabulary=vocabulary, mapping=mapping).table
+    return before, after[["start_s", "end_s", "label"]]
 
 
 def corpus_corrections(
@@ -208,9 +235,10 @@ def corpus_corrections(
     *,
     tier: str = "affect",
     vocabulary: Vocabulary | None = None,
+    mapping: MappingOrFile | None = None,
 ) -> list[tuple[pd.DataFrame, pd.DataFrame] | None]:
     """`read_corrections` of each annotation of a corpus, with its signer."""
-    return [read_corrections(file, signer, tier=tier, vocabulary=vocabulary) for file, signer in files]
+    return [read_corrections(f, signer, tier=tier, vocabulary=vocabulary, mapping=mapping) for f, signer in files]
 
 
 def channel_labels(root: etree._Element) -> dict[str, tuple[str, dict[str, str]]]:
@@ -227,6 +255,17 @@ def channel_labels(root: etree._Element) -> dict[str, tuple[str, dict[str, str]]
         except (ValueError, KeyError, TypeError, AttributeError):
             continue  # edited by someone: the tier is then read as any other
     return labels_of
+
+
+def _meanings(root: etree._Element, mapping: MappingOrFile | None) -> dict[str, tuple[str, str, dict[str, str]]]:
+    """Of a laboratory's tiers the channel, the signer and our labels: what we wrote to, and what a mapping names."""
+    tiers = {tier.get("TIER_ID") or "": tier for tier in root.iterfind("TIER")}
+    written = {
+        name: (channel, tiers[name].get("PARTICIPANT") or "", labels)
+        for name, (channel, labels) in channel_labels(root).items()
+        if name in tiers
+    }
+    return written | tier_meanings(as_mapping(mapping), tiers)
 
 
 def _root(file: Path) -> etree._Element:
@@ -248,7 +287,7 @@ def _checked_rows(
     rows: list[tuple[int, int, str]] = []
     allowed = set(vocabulary.allowed)
     for start, end, value in annotations:
-        label = meaning.get(value, value.strip())
+        label = meaning.get(value, meaning.get(value.strip(), value.strip()))
         if not label:
             continue
         if start is None or end is None or start >= end:
@@ -277,21 +316,27 @@ def _merged(rows: list[tuple[int, int, str]]) -> list[tuple[int, int, str]]:
     return merged
 
 
-def _vocabulary_of(root: etree._Element, name: str, rows: list[Row], file: Path) -> Vocabulary:
+def _vocabulary_of(root: etree._Element, name: str, rows: list[Row], file: Path, meaning: dict[str, str]) -> Vocabulary:
     """The closed vocabulary of a tier, or one of what it holds; `none` alone where nothing happened in the take."""
-    closed = vocabulary_of_tier(root, name, file)
-    labels = sorted({value.strip() for _, _, value in rows} - {""})
+    closed = None if meaning else vocabulary_of_tier(root, name, file)
+    labels = sorted({meaning.get(value.strip(), value.strip()) for _, _, value in rows} - {""})
     return closed or Vocabulary(name.partition("@")[0], tuple(labels or [NONE]))
 
 
-def _tier_name(root: etree._Element, wanted: str, signer: str | None, file: Path) -> str:
+def _tier_name(
+    root: etree._Element,
+    wanted: str,
+    signer: str | None,
+    file: Path,
+    meanings: dict[str, tuple[str, str, dict[str, str]]],
+) -> str:
     """The tier of a channel, of a signer where one is named."""
     tiers = {tier.get("TIER_ID") or "": tier for tier in root.iterfind("TIER")}
-    labs = [name for name, (channel, _) in channel_labels(root).items() if channel == wanted and name in tiers]
+    labs = [name for name, (channel, _, _) in meanings.items() if channel == wanted]
     ours = [name for name in tiers if name == wanted or name.startswith(f"{wanted}@")]
     hint = _tier_hint(wanted, list(tiers))
     if signer:
-        of_signer = [name for name in labs if tiers[name].get("PARTICIPANT") == clean_name(signer)]
+        of_signer = [name for name in labs if meanings[name][1] == clean_name(signer)]
         for name in (tier_name(wanted, signer), wanted):
             if name in ours:
                 return name

@@ -129,7 +129,8 @@ def renamed(
             name = names.get(tier, tier)
             if name in theirs:
                 raise SignfaceError(f"{annotator} would have two tiers {name}", hint="rename one of them otherwise")
-            theirs[name] = table.assign(label=[names.get(str(label), label) for label in table["label"]])
+            called = [names.get(str(label), label) for label in table["label"]]
+            theirs[name] = table.assign(label=pd.Series(called, table.index, dtype=object))
         result[annotator] = theirs
     return result
 

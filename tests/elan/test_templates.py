@@ -7,7 +7,8 @@ import pytest
 from lxml import etree
 
 from signface.elan.document import read_document, tier_rows
-from signface.elan.mapping import ChannelRule, read_mapping, suggest_mapping
+from signface.elan.mapping import ChannelRule, read_mapping
+from signface.elan.mapping_draft import suggest_mapping
 from signface.elan.tiers import Tier
 from signface.elan.writing import prepare, write_eaf
 from signface.errors import SignfaceError
