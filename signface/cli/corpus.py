@@ -47,6 +47,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     run_.add_argument(
         "--classifier", default="default", metavar="NAME_OR_FILE", help="a shipped classifier or a .skops file"
     )
+    run_.add_argument(
+        "--clause", action="append", default=[], metavar="NAME_OR_FILE",
+        help="a further model, of any tier, whose segments get a tier of their own; may be given several times",
+    )  # fmt: skip
     add_settings_arguments(run_, EafOptions)
 
     signers = actions.add_parser(
@@ -116,6 +120,7 @@ def run_all(arguments: argparse.Namespace) -> int:
         output=output,
         settings=settings_from(arguments, SolveSettings),
         classifier=arguments.classifier,
+        clauses=arguments.clause,
         workers=arguments.workers,
         scheduler=arguments.scheduler,
         options=settings_from(arguments, EafOptions),

@@ -45,6 +45,26 @@ DONE, BEFORE, CORRECTED, FAILED = "done", "before", "corrected", "failed"
 
 
 @dataclass(frozen=True)
+class Further:
+    """A model beside the classifier, whose segments get a tier of their own.
+
+    Parameters
+    ----------
+    classifier, model : str
+        A shipped name or a file, and its SHA-256.
+    recipe : Recipe
+        How its takes were solved, and this one is.
+    signer : Signer
+        With the level over takes that were solved so, where the model needs one.
+    """
+
+    classifier: str
+    model: str
+    recipe: Recipe
+    signer: Signer
+
+
+@dataclass(frozen=True)
 class Job:
     """All that a process needs to annotate one take.
 
@@ -68,6 +88,8 @@ class Job:
         Their SHA-256, the content of their files included.
     signer : Signer
         Who signs, with the level where the classifier needs one.
+    further : tuple of Further
+        Further models.
     """
 
     entry: TakeEntry
@@ -80,6 +102,7 @@ class Job:
     options: EafOptions
     options_digest: str
     signer: Signer
+    further: tuple[Further, ...] = ()
 
     @property
     def take(self) -> str:
@@ -149,7 +172,7 @@ def annotate_job(job: Job) -> Outcome:
 
 def _annotate(job: Job, notes: list[str]) -> tuple[str, bool, str]:
     """State, whether it was solved, and what was found; `notes` gets what the log should say."""
-    from signface.annotation import annotate
+    from signface.annotation import annotate, find_clause
     from signface.elan.writing import check_writable, write_eaf
 
     if (job.recipe.solver, job.code) != (code_digest(*SOLVING_CODE), code_digest(*ANNOTATING_CODE)):
@@ -171,7 +194,12 @@ def _annotate(job: Job, notes: list[str]) -> tuple[str, bool, str]:
         write_log(job, [*notes, str(error), CORRECTED])
         return CORRECTED, solved, f"{job.eaf}: was worked in and stays as it is"
     model = _model(job.classifier, job.model)
-    annotation = annotate(descriptors, model, signer=job.signer, channels=job.options.channels or False)
+    clauses = []
+    for one in job.further:
+        seen, _ = stored_or_solved(job.entry, find_origin(job.entry, job.corpus, one.recipe), store, job.corpus)
+        clauses.append(find_clause(seen, _model(one.classifier, one.model), signer=one.signer))
+    channels = job.options.channels or False
+    annotation = annotate(descriptors, model, signer=job.signer, channels=channels, clauses=clauses)
     properties = {"file": origin.file}
     write_eaf(annotation, job.eaf, options=job.options, video=job.entry.video, date=DATE, properties=properties)
     write_log(job, [*notes, str(annotation), f"written to {job.eaf}", ending])
@@ -182,6 +210,8 @@ def _annotation_key(job: Job, descriptors: str) -> str:
     """SHA-256 of all that an annotation depends on, from the key of the descriptors."""
     video = "" if job.entry.video is None else os.path.relpath(job.entry.video, job.output)
     content = [descriptors, job.model, job.code, job.options_digest, job.entry.signer, video, job.signer.level_digest]
+    for one in job.further:
+        content += [find_origin(job.entry, job.corpus, one.recipe).key, one.model, one.signer.level_digest]
     return hashlib.sha256("\n".join(content).encode()).hexdigest()
 
 
@@ -199,7 +229,7 @@ def _last_line(log: Path) -> str:
         return ""
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=4)
 def _model(classifier: str, digest: str) -> TrainedModel:
     """A classifier whose content is the one that was asked for."""
     from signface.label.persistence import load_model

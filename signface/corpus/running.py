@@ -15,15 +15,25 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from signface.channels.rules import read_channels
 from signface.corpus.cluster import WorkerDied, on_cluster, on_cores
 from signface.corpus.describing import recipe_of
-from signface.corpus.jobs import ANNOTATING_CODE, FAILED, LOGS, Job, Outcome, annotate_job, solve_job, write_log
+from signface.corpus.jobs import (
+    ANNOTATING_CODE,
+    FAILED,
+    LOGS,
+    Further,
+    Job,
+    Outcome,
+    annotate_job,
+    solve_job,
+    write_log,
+)
 from signface.corpus.manifest import Corpus, TakeEntry
 from signface.corpus.origin import Recipe, code_digest, find_origin, make_recipe, shipped_digest, take_name
 from signface.corpus.signers import find_signer, warn_of_unknown_rests
@@ -33,7 +43,10 @@ from signface.errors import SignfaceError
 from signface.settings.choices import BY_SIGNER
 from signface.settings.eaf import EafOptions
 from signface.settings.solve import SolveSettings
-from signface.signer import Signer
+
+if TYPE_CHECKING:
+    from signface.label.model import Card
+    from signface.signer import Signer
 
 #: Where annotations go when nothing else is said, in the folder of the corpus.
 ANNOTATED = "annotated"
@@ -46,6 +59,7 @@ def run_corpus(
     output: Path | None = None,
     settings: SolveSettings | None = None,
     classifier: str = "default",
+    clauses: Sequence[str] = (),
     workers: int | None = None,
     scheduler: str | None = None,
     options: EafOptions | None = None,
@@ -61,6 +75,9 @@ def run_corpus(
         As in `signface.annotation.annotate`; a take whose row names a face or a layout has its own. Signers are those
         of `signface.corpus.signers`; where the classifier normalises signers and no level of theirs is known, all takes
         are solved first, and a signer's level is that of all of them.
+    clauses : sequence of str
+        Further models, shipped names or files, whose segments get tiers of their own; takes are solved for each as its
+        training takes were.
     workers : int, optional
         Takes at a time on this machine; as many as it has cores by default.
     scheduler : str, optional
@@ -97,18 +114,27 @@ def run_corpus(
     with only_run_in(output):
         yield from failed
 
-        def everywhere(work: Callable[[Job], Outcome]) -> Iterator[tuple[Job, Any]]:
+        def everywhere(work: Callable[[Job], Outcome], jobs: list[Job]) -> Iterator[tuple[Job, Any]]:
             if scheduler is not None:
                 return on_cluster(work, jobs, scheduler=scheduler)
             return on_cores(work, jobs, workers=min(workers or os.cpu_count() or 1, max(1, len(jobs))))
 
         from signface.label.persistence import read_card
 
-        if read_card(classifier).normalise in BY_SIGNER:
-            for _ in everywhere(solve_job):  # what fails says so when it is annotated
+        def with_levels(jobs: list[Job], card: Card) -> list[Job]:
+            if card.normalise not in BY_SIGNER:
+                return jobs
+            for _ in everywhere(solve_job, jobs):  # what fails says so when it is annotated
                 pass
-            jobs = _with_levels(jobs, store)
-        for job, result in everywhere(annotate_job):
+            return _with_levels(jobs, store, card.bases)
+
+        seen_by = [with_levels(_solved_as(jobs, read_card(name)), read_card(name)) for name in clauses]
+        jobs = with_levels(jobs, read_card(classifier))
+        for name, same in zip(clauses, seen_by, strict=True):
+            model = shipped_digest("classifiers", ".skops", name)
+            pairs = zip(jobs, same, strict=True)
+            jobs = [replace(a, further=(*a.further, Further(name, model, b.recipe, b.signer))) for a, b in pairs]
+        for job, result in everywhere(annotate_job, jobs):
             if isinstance(result, WorkerDied):
                 result = Outcome(job.take, FAILED, message=f"{job.entry.path}: {result}")
                 write_log(job, [result.message, FAILED])
@@ -139,6 +165,7 @@ def plan_jobs(
     folder = Path(os.path.abspath(corpus.folder))
     known: dict[tuple[str, str | None], Recipe] = {}
     jobs: dict[str, Job] = {}
+    signers: dict[str, Signer] = {}
     failed = []
     for entry in corpus:
         name = take_name(entry, corpus.folder)
@@ -153,24 +180,33 @@ def plan_jobs(
         except SignfaceError as error:
             failed.append(Outcome(name, FAILED, message=f"{entry.path}: {error}"))
             continue
-        what = (classifier, model, code, options, options_digest, Signer(entry.signer))
+        if entry.signer not in signers:
+            signers[entry.signer] = find_signer(folder, entry.signer)
+        what = (classifier, model, code, options, options_digest, signers[entry.signer])
         jobs[name] = Job(_absolute(entry), folder, output, solved_as, *what)
     return list(jobs.values()), failed
 
 
-def _with_levels(jobs: list[Job], store: DescriptorStore) -> list[Job]:
-    """The jobs with signers who have a level: of their file in the corpus, or of all their takes in the store."""
+def _solved_as(jobs: list[Job], card: Card) -> list[Job]:
+    """The jobs, their takes solved as those that a model was trained on."""
+    recipe = make_recipe(SolveSettings.from_dict(card.solve))
+    known: dict[tuple[str, str | None], Recipe] = {}
+    return [replace(job, recipe=recipe_of(job.entry, recipe, known)) for job in jobs]
+
+
+def _with_levels(jobs: list[Job], store: DescriptorStore, bases: Sequence[str]) -> list[Job]:
+    """The jobs with signers who have a level of these bases: of their file in the corpus, or of all their takes."""
     signers = {}
     for name in {job.entry.signer for job in jobs}:
         signer = find_signer(jobs[0].corpus, name)
-        if signer.level is None:
+        if signer.level is None or not set(bases) <= set(signer.level.names):
             takes = []
             for job in jobs:
                 if job.entry.signer == name:
                     with contextlib.suppress(SignfaceError):
                         takes.append(store.read(find_origin(job.entry, job.corpus, job.recipe)))
             solved = [take for take in takes if take is not None]
-            signer = signer.with_level(solved) if solved else signer
+            signer = signer.with_level(solved) if solved else replace(signer, level=None)
         signers[name] = signer
     return [replace(job, signer=signers[job.entry.signer]) for job in jobs]
 

@@ -13,17 +13,23 @@ from pathlib import Path
 
 import pytest
 from lxml import etree
+from pympi.Elan import Eaf
 
+from signface.annotation import find_clause
+from signface.channels.rules import find_channels, read_channels
 from signface.cli.main import main
 from signface.corpus.cluster import WorkerDied, on_cluster, on_cores
 from signface.corpus.jobs import BEFORE, CORRECTED, DONE, FAILED
 from signface.corpus.manifest import Corpus, TakeEntry, read_corpus, write_takes
+from signface.corpus.origin import take_name
 from signface.corpus.running import run_corpus
-from signface.descriptors_files import write_weights
+from signface.descriptors_files import read_weights, write_weights
 from signface.errors import SignfaceError
-from signface.label.persistence import save_model
+from signface.label.persistence import load_model, save_model
 from signface.learn.training import train
+from signface.settings.eaf import EafOptions
 from signface.settings.solve import SolveSettings
+from signface.signer import Signer
 from tests.conftest import REPOSITORY
 from tests.fixtures.hand_made import corpus as hand_made_corpus
 from tests.fixtures.training import quick
@@ -277,3 +283,48 @@ def test_channels_doubts_and_the_template_of_a_lab_are_written_as_annotate_write
     assert main([*run, "--template", str(tmp_path / "none.etf")]) == 2
     states_after = [outcome.state for outcome in run_corpus(read_corpus(feel), classifier=str(ready / "mine.skops"))]
     assert set(states_after) == {DONE}
+
+
+def test_a_further_model_gets_its_tier_in_every_take(feel, ready, tmp_path):
+    """And a run that had none is done again, but not solved again."""
+    other = tmp_path / "other.skops"
+    normalised = train(hand_made_corpus(), quick("knn1").changed(normalise="signer"))
+    save_model(normalised, other)
+    assert states(run_here(feel, ready)) == [DONE]
+    again = run_here(feel, ready, clauses=[str(other)])
+    assert states(again) == [DONE]
+    assert not any(outcome.solved for outcome in again.values())
+    assert states(run_here(feel, ready, clauses=[str(other)])) == [BEFORE]
+    model = load_model(other)
+    made = list(read_corpus(feel))
+    of_one = [read_weights(entry.path) for entry in made if entry.signer == made[0].signer]
+    signer = Signer(made[0].signer).with_level(of_one)
+    expected = find_clause(of_one[0], model, signer=signer).segments.table
+    eaf = Eaf(str(feel / "annotated" / f"{take_name(made[0], feel)}.eaf"))
+    told = eaf.get_annotation_data_for_tier(f"affect-other@{made[0].signer}")
+    assert [row[2] for row in told] == expected["label"].tolist()
+    assert [row[0] for row in told] == pytest.approx((expected["start_s"] * 1000).tolist(), abs=1)
+
+
+def test_the_rules_of_channels_know_the_level_of_a_signer_of_the_corpus(feel, ready, tmp_path):
+    """As in `annotate` of all takes of a signer."""
+    made = list(read_corpus(feel))
+    entries = [entry for entry in made if entry.signer == made[0].signer]
+    takes = [read_weights(entry.path) for entry in entries]
+    signer = Signer(made[0].signer).with_level(takes)
+    (feel / "signers").mkdir()
+    signer.save(feel / "signers" / f"{signer.name}.json")
+    table = tmp_path / "channels.toml"
+    thresholds = ("on = 0.5", "off = 0.4", "min_ms = 40")
+    rows = ("[brows.raised]", 'bases = ["base0"]', *thresholds, "[brows.raised.signer]", "on = 0.1", "off = 0.05")
+    table.write_text("\n".join(rows), "utf-8")
+    run_here(feel, ready, options=EafOptions(channels=table))
+    rules = read_channels(table)
+    known, alone = (
+        [find_channels(take, rules, level=level)[0].table for take in takes] for level in (signer.level, None)
+    )
+    assert any(len(a) != len(b) for a, b in zip(known, alone, strict=True))  # it matters
+    for entry, found in zip(entries, known, strict=True):
+        eaf = Eaf(str(feel / "annotated" / f"{take_name(entry, feel)}.eaf"))
+        told = sorted(eaf.get_annotation_data_for_tier(f"brows@{signer.name}"))
+        assert [row[0] for row in told] == pytest.approx((found["start_s"] * 1000).tolist(), abs=1)
