@@ -350,7 +350,7 @@ def lse(here: Real, others: Real | None) -> list[Row]:
     rows = []
     units = load(UNITS)
     for how, folds in (("action units", units), ("measures", load(MEASURES))):
-        clips = CLIPS.changed(normalise="range")
+        clips = CLIPS.changed(normalise="range", parameters={"min_samples_leaf": 2})
         right = judged_labels(side_by_side(learnt_labels, given(folds), clips))
         rows.append(Row("LSE", "given segments, 3 classes", f"trees on courses of {how} and head", right))
     found = side_by_side(learnt_segments, units, SENTENCES)
