@@ -25,8 +25,9 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from signface.corpus.manifest import read_corpus
-from signface.errors import SignfaceError
+from signface.errors import SignfaceError, SignfaceWarning
 from signface.evaluation.protocol import score_model
+from signface.label.familiarity import UNKNOWN, UNLIKE
 from signface.label.labelling import find_segments
 from signface.label.model import TrainedModel
 from signface.label.persistence import load_model
@@ -93,6 +94,7 @@ COLUMNS = {
     "frames": "frames right",
     "boundaries": "boundary F1, 0.1 s",
     "confidence": "mean confidence",
+    "unlike": "takes it calls unlike its training",
 }
 
 
@@ -131,8 +133,10 @@ def make_rows(conditions: Sequence[Condition] = CONDITIONS, *, workers: int = 2)
 
 def measure(model: TrainedModel, examples: Sequence[Example]) -> dict[str, float]:
     """The columns of `COLUMNS` for a model, and how many reference segments there are."""
-    scores = score_model(model, examples)
-    found = [find_segments(example.descriptors, model) for example in examples]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SignfaceWarning)  # that --cutoff 5 is not how the training was solved
+        scores = score_model(model, examples)
+        found = [find_segments(example.descriptors, model) for example in examples]
     sure = np.concatenate([_stable(segments)["confidence"].to_numpy(float) for segments in found])
     return {
         "found": scores["automatic_segments"]["accuracy"],
@@ -140,6 +144,7 @@ def measure(model: TrainedModel, examples: Sequence[Example]) -> dict[str, float
         "frames": scores["frames"]["accuracy"],
         "boundaries": scores["segmentation"]["boundary_f1"]["0.10"],
         "confidence": float(sure.mean()),
+        "unlike": float(np.mean([any(step.startswith(UNLIKE) for step in segments.history) for segments in found])),
         "n": scores["manual_segments"]["n"],
     }
 
@@ -181,16 +186,19 @@ def real_statements(folder: Path, kind: str, most: int) -> list:
 
 def affect_found(model: TrainedModel, takes: Sequence) -> dict[str, float]:
     """In how many takes a model finds an affect, for how much of the time, and how sure it is of all it finds."""
-    shares, sure = [], []
+    shares, sure, unlike = [], [], []
     for take in takes:
-        table = _stable(find_segments(take, model))
+        found = find_segments(take, model)
+        unlike.append(any(step.startswith(UNLIKE) for step in found.history))
+        table = _stable(found)
         length = (table["end_s"] - table["start_s"]).to_numpy(float)
-        named = ~table["label"].isin([NEUTRAL, "unknown"]).to_numpy()
+        named = ~table["label"].isin([NEUTRAL, UNKNOWN]).to_numpy()
         shares.append(length[named].sum() / take.duration)
         sure += table["confidence"].tolist()
     return {
         "takes": float(np.mean(np.array(shares) > 0)),
         "time": float(np.mean(shares)),
+        "unlike": float(np.mean(unlike)),
         "confidence": float(np.mean(sure)),
         "n": len(takes),
     }
@@ -235,8 +243,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for name, values in results["real"].items():
             print(
                 f"\n{values['n']} plain statements of real signers ({given.real.name}), {name}: an affect is found in "
-                f"{values['takes']:.0%} of them, for {values['time']:.0%} of the time; mean confidence "
-                f"{values['confidence']:.2f}"
+                f"{values['takes']:.0%} of them, for {values['time']:.0%} of the time; {values['unlike']:.0%} are "
+                f"called unlike the training; mean confidence {values['confidence']:.2f}"
             )
     print(f"\n{time.monotonic() - began:.0f} s")
     if given.output is not None:

@@ -20,7 +20,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from benchmarks.generalisation import make_rows, measure, table
+from benchmarks.generalisation import everything_neutral, make_rows, measure, table
 from signface.errors import SignfaceError
 from signface.evaluation.protocol import score_model
 from signface.files import whole_file
@@ -55,6 +55,8 @@ AS_IT_IS = -1
 FOLDER = Path(__file__).resolve().parent / "classifiers"
 #: name: classifier and kinds of takes that it is trained on.
 SHIPPED = {"default": ("gru", ["IE", "SE", "EU"]), "thesis-forest": ("forest", ["IE", "SE"])}
+#: The one that learns variations, and what it knows.
+VARIED = "default"
 TEST_KINDS = ["EU"]
 SCORED = {
     "manual_segments": "accuracy on EU reference segments, unseen signers",
@@ -69,7 +71,7 @@ def main() -> None:
     parser.add_argument("names", nargs="*", default=list(SHIPPED), help="which classifiers (default: all)")
     parser.add_argument("--workers", type=int, default=2, help="takes solved at a time (default: 2)")
     arguments = parser.parse_args()
-    copies = COPIES if "default" in arguments.names else 0
+    copies = COPIES if VARIED in arguments.names else 0
     training = [
         (request, copy) for copy in (AS_IT_IS, *range(copies)) for request in plan_corpus(signers=SIGNERS, seed=SEED)
     ]
@@ -77,7 +79,10 @@ def main() -> None:
     solved = examples_of(training, workers=arguments.workers)
     tested = examples_of(test, workers=arguments.workers)
     for name in arguments.names:
-        build(name, solved, tested)
+        model = trained(name, solved)
+        if name == VARIED:
+            model = with_familiarity(model, *takes_to_know_by(workers=arguments.workers))
+        write(model, tested, make_rows(workers=arguments.workers) if name == VARIED else {})
         print((FOLDER / f"{name}.md").read_text(encoding="utf-8"))
 
 
@@ -145,34 +150,40 @@ def with_familiarity(model: TrainedModel, known: list[Example], strange: list[Ex
     return replace(model, card=replace(model.card, familiarity=fit_familiarity(*told)))
 
 
-def build(name: str, training: list[Example], test: list[Example]) -> None:
-    """Train, measure and write one classifier.
-
-    Parameters
-    ----------
-    name : str
-        One of `SHIPPED`.
-    training, test : list of Example
-        Solved takes of the two corpora.
-    """
+def trained(name: str, training: list[Example]) -> TrainedModel:
+    """One classifier of `SHIPPED`, trained on the takes that are its own among solved ones."""
     classifier, kinds = SHIPPED[name]
-    varied = name == "default"
-    model = train(
+    varied = name == VARIED
+    return train(
         [e for e in training if e.kind in kinds and (varied or e.take.count("_") == USUAL_NAME)],
         TrainingSettings(classifier=classifier, calibrate=False),
         solve=SolveSettings(layout="default-40"),
         corpus="synthetic (signface synth)",
         name=name,
     )
+
+
+def write(model: TrainedModel, test: list[Example], outside: dict[str, list[Example]]) -> None:
+    """Measure a classifier and write it with its card.
+
+    Parameters
+    ----------
+    model : TrainedModel
+    test : list of Example
+    outside : dict of str to list of Example
+        Rows of `benchmarks.generalisation.make_rows`; none to leave them out.
+    """
     scores = score_model(model, test)
     measured = {what: scores[section]["accuracy"] for section, what in SCORED.items()}
     model = replace(model, card=replace(model.card, scores=measured))
-    save_model(model, FOLDER / f"{name}.skops")
-    outside = ""
-    if varied:
-        outside = table({row: {name: measure(model, examples)} for row, examples in make_rows().items()})
-    with whole_file(FOLDER / f"{name}.md") as temporary:
-        temporary.write_text(card_text(name, model.card, scores, outside), encoding="utf-8")
+    save_model(model, FOLDER / f"{model.name}.skops")
+    beyond = {
+        row: {model.name: measure(model, examples), "everything neutral": everything_neutral(examples)}
+        for row, examples in outside.items()
+    }
+    with whole_file(FOLDER / f"{model.name}.md") as temporary:
+        text = card_text(model.name, model.card, scores, table(beyond) if beyond else "")
+        temporary.write_text(text, encoding="utf-8")
 
 
 def card_text(name: str, card: Card, sections: dict, outside: str = "") -> str:
