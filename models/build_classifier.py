@@ -257,9 +257,10 @@ def _outside(outside: str) -> str:
 ## Outside the training
 
 Utterances of invented signers whom no training met, recorded otherwise, and of a second generator
-(`signface synth --generator other`), which nothing was trained on or chosen by; neutral frames are looked for
+(`signface synth --generator other`), on which no label was trained; neutral frames are looked for
 (`python -m benchmarks.generalisation`, [Generalisation](../../docs/generalisation.md)). Rows of jitter and rate are of
-what it was trained to pass over; those of another generator are not.
+what it was trained to pass over; those of another generator are not. In takes that it calls unlike its training, what
+it would name is called `unknown`; what tells them was learnt from others of its own generator and of the second one.
 
 {outside}
 """
