@@ -9,6 +9,7 @@ import pytest
 from lxml import etree
 
 from signface.cli.main import main
+from signface.label.familiarity import UNKNOWN
 from signface.label.vocabulary import AFFECT
 
 
@@ -23,10 +24,18 @@ def signer_eaf(signer_pose, tmp_path_factory):
 def test_a_real_signer_becomes_a_valid_eaf_with_labelled_segments(signer_eaf, eaf_schema):
     eaf_schema.assertValid(etree.parse(str(signer_eaf)))
     rows = sorted(pympi.Eaf(str(signer_eaf)).get_annotation_data_for_tier("affect@S1"))
-    assert all(row[2] in AFFECT.values or AFFECT.is_transition(row[2]) for row in rows)
+    known = AFFECT.including(UNKNOWN)
+    assert all(row[2] in known.values or known.is_transition(row[2]) for row in rows)
     assert rows[0][0] == 0
     assert rows[-1][1] == pytest.approx(130 / 30 * 1000, abs=1)
     assert all(end == start for (_, end, *_), (start, *_) in itertools.pairwise(rows))
+
+
+def test_of_a_real_signer_no_affect_is_named(signer_eaf):
+    """The classifier that ships has met none: whatever it sees but rest, it does not know."""
+    rows = pympi.Eaf(str(signer_eaf)).get_annotation_data_for_tier("affect@S1")
+    stable = {row[2] for row in rows} & {*AFFECT.values, UNKNOWN}
+    assert stable <= {"N", UNKNOWN}
 
 
 def test_every_label_of_a_real_signer_has_a_confidence(signer_eaf):

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from signface.descriptors import Descriptors
+from signface.label.familiarity import UNKNOWN
 from signface.label.spans import segment_means
 from signface.label.vocabulary import AFFECT
 from signface.segmentation.segments import Segments
@@ -45,10 +46,11 @@ class IntensityClassifier:
     rest_: str = AFFECT.rest
 
     def predict(self, take: Descriptors, spans: np.ndarray, labels: Sequence[str]) -> list[int | None]:
-        """Intensity of each (S, 2) span of a take with its label; None at rest and where nothing was seen."""
+        """Intensity of each (S, 2) span of a take with its label; None at rest, where nothing was seen, and
+        of what is unknown."""
         table = pd.DataFrame({"start_s": spans[:, 0], "end_s": spans[:, 1], "label": list(labels)})
         strength = self.strength(take, table)
-        judged = np.isfinite(strength) & (table["label"] != self.rest_).to_numpy()
+        judged = np.isfinite(strength) & ~table["label"].isin([self.rest_, UNKNOWN]).to_numpy()
         levels: list[int | None] = [None] * len(table)
         if judged.any():
             odds = strength[judged, None] * self.lines_[:, 0] + self.lines_[:, 1]

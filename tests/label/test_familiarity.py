@@ -86,8 +86,7 @@ def test_in_a_strange_take_what_is_not_neutral_is_unknown(mini_weights, model):
     np.testing.assert_allclose(*neutral)
     assert (found["start_s"].to_numpy()[1:] >= found["end_s"].to_numpy()[:-1] - 1e-9).all()
     assert found["end_s"].max() == pytest.approx(plain["end_s"].max())
-    if "intensity" in found:
-        assert found.loc[found["label"] == "N", "intensity"].isna().all()
+    assert found["intensity"].isna().all()
 
 
 def test_neighbours_that_are_unknown_are_one(mini_weights, model):
