@@ -27,10 +27,11 @@ from joblib import Parallel, delayed
 from signface.corpus.manifest import read_corpus
 from signface.errors import SignfaceError, SignfaceWarning
 from signface.evaluation.protocol import score_model
-from signface.label.familiarity import UNKNOWN, UNLIKE
+from signface.label.familiarity import UNLIKE
 from signface.label.labelling import find_segments
 from signface.label.model import TrainedModel
 from signface.label.persistence import load_model
+from signface.label.vocabulary import UNKNOWN
 from signface.learn.examples import Example
 from signface.segmentation.segments import Segments
 from signface.settings.solve import SolveSettings

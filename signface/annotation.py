@@ -168,8 +168,7 @@ class Annotation(Content):
     @property
     def vocabulary(self) -> Vocabulary:
         """What the labels stand for; with `unknown`, where the model abstained."""
-        from signface.label.familiarity import UNKNOWN
-        from signface.label.vocabulary import AFFECT
+        from signface.label.vocabulary import AFFECT, UNKNOWN
 
         vocabulary = AFFECT if self.card is None else self.card.vocabulary
         return vocabulary.including(UNKNOWN) if (self.segments.table["label"] == UNKNOWN).any() else vocabulary

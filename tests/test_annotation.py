@@ -9,8 +9,7 @@ import pytest
 from lxml import etree
 
 from signface.cli.main import main
-from signface.label.familiarity import UNKNOWN
-from signface.label.vocabulary import AFFECT
+from signface.label.vocabulary import AFFECT, UNKNOWN
 
 
 @pytest.fixture(scope="module")

@@ -20,11 +20,10 @@ import pandas as pd
 from signface.channels.rules import find_intensities
 from signface.errors import SignfaceError
 from signface.label.calibration import brier_score, expected_calibration_error
-from signface.label.familiarity import UNKNOWN
 from signface.label.intensity import IntensityClassifier
 from signface.label.labelling import find_segments, label_segments, label_spans
 from signface.label.model import TrainedModel
-from signface.label.vocabulary import Vocabulary
+from signface.label.vocabulary import UNKNOWN, Vocabulary
 from signface.learn.examples import Example, common_vocabulary, signer_levels
 from signface.learn.folds import groups_of, inner_folds
 from signface.learn.ordinal import ordinal_metrics

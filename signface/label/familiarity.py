@@ -21,6 +21,7 @@ import numpy as np
 import pandas as pd
 
 from signface.descriptors import Descriptors
+from signface.label.vocabulary import UNKNOWN
 from signface.segmentation.noise import jitter
 from signface.segmentation.segments import Segments
 
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
 NAMES = ("confidence", "residual", "jitter", "distance")
 #: A residual below this (mm) says nothing: weights of a phone, or of no solve, have none.
 NO_RESIDUAL_MM = 1e-6
-#: What a segment is called whose affect the model cannot know. It is not neutral: something is shown.
-UNKNOWN = "unknown"
 #: How the step of the history begins that says so.
 UNLIKE = "unlike what"
 #: Share of the known takes whose familiarity may lie below the limit.

@@ -11,9 +11,8 @@ import numpy as np
 import pandas as pd
 
 from signface.descriptors import Descriptors
-from signface.label.familiarity import UNKNOWN
 from signface.label.spans import segment_means
-from signface.label.vocabulary import AFFECT
+from signface.label.vocabulary import AFFECT, UNKNOWN
 from signface.segmentation.segments import Segments
 
 #: The intensities there are.

@@ -44,6 +44,9 @@ RESTING = ("none", "neutral")
 #: The label of what nobody annotated.
 NONE = "none"
 
+#: The label of what a model abstains from (`signface.label.familiarity`). It is not rest: something is shown.
+UNKNOWN = "unknown"
+
 
 class Entry(NamedTuple):
     """One value of a vocabulary.

@@ -13,7 +13,6 @@ from signface.elan.writing import write_eaf
 from signface.evaluation.protocol import score_model
 from signface.label.familiarity import (
     NAMES,
-    UNKNOWN,
     abstained,
     familiarity,
     fit_familiarity,
@@ -21,6 +20,7 @@ from signface.label.familiarity import (
 )
 from signface.label.labelling import find_segments
 from signface.label.persistence import load_model, save_model
+from signface.label.vocabulary import UNKNOWN
 from signface.segmentation.segments import Segments
 
 #: Of these slopes a take is known or not by its offset alone.
