@@ -67,7 +67,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--learning-curve",
         action="store_true",
-        help="draw learning curves of all classifiers, not only of those of the thesis (sequence models: minutes)",
+        help="draw learning curves of all classifiers (sequence models: minutes); by default of those of the thesis on the "
+        "tier affect, and of none on others",
     )
     parser.add_argument(
         "--date", metavar="WORDS", help="date to print on the report (default: none, so that its bytes repeat)"
@@ -118,7 +119,7 @@ def run(arguments: argparse.Namespace) -> None:
         train_kinds=train_kinds,
         test_kinds=test_kinds,
         classifiers=arguments.classifiers,
-        curves_of=arguments.classifiers if arguments.learning_curve else None,
+        curves_of=arguments.classifiers if arguments.learning_curve else None if arguments.tier == "affect" else (),
         progress=progress,
     )
     page = write_report(measured, examples, corpus, arguments.output, settings=solve, date=arguments.date)
