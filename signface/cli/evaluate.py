@@ -67,8 +67,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--learning-curve",
         action="store_true",
-        help="draw learning curves of all classifiers (sequence models: minutes); by default of those of the thesis on the "
-        "tier affect, and of none on others",
+        help="draw learning curves of all classifiers (sequence models: minutes); by default those of the thesis "
+        "on the tier affect, and none on others",
     )
     parser.add_argument(
         "--date", metavar="WORDS", help="date to print on the report (default: none, so that its bytes repeat)"
