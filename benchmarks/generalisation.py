@@ -7,7 +7,7 @@ Nothing is chosen on any of them. Every take is solved as `signface annotate` do
 With `--real FOLDER --kind st`, a folder with a `takes.csv` of real signers: on plain statements, in which nobody was
 asked for an affect, how much of the time one is found. (Whether the signers felt any, nobody wrote down.)
 
-MODELS are names or files of classifiers, `default` if none is named. Under five minutes on two cores.
+MODELS are names or files of classifiers, `default` if none is named. Some minutes on two quiet cores.
 """
 
 from __future__ import annotations
