@@ -3,7 +3,8 @@
 - `frame_labels`: what each annotator says at each moment.
 - `cohen_kappa`, `krippendorff_alpha`: chance-corrected agreement on frames.
 - `match_annotations`, `modified_kappa`: agreement on annotations that overlap (Holle and Rein 2014, EasyDIAg).
-- `gamma`: the measure of Mathet et al. (2015), which aligns and compares at once (needs pygamma-agreement).
+- `gamma`, `gamma_interval`: the measure of Mathet et al. (2015), which aligns and compares at once (needs
+  pygamma-agreement).
 - `boundary_distances`: how far the starts and ends of matched annotations lie apart.
 - `confusion`: who called what what, "nothing" included.
 - `agreement_table`: all of them for each pair of annotators.
@@ -33,6 +34,8 @@ FRAME_S = 0.01
 
 #: Share of the longer of two annotations that must overlap for them to be a match (Holle and Rein 2014).
 OVERLAP = 0.6
+#: How closely the disorder of chance is known that gamma is held against, as a share of it.
+GAMMA_PRECISION = 0.02
 
 
 def frame_labels(tables: Sequence[pd.DataFrame], *, frame_s: float = FRAME_S) -> np.ndarray:
@@ -203,10 +206,22 @@ def _ratio(wanted: np.ndarray, given: np.ndarray) -> np.ndarray:
 
 
 def gamma(tables: Sequence[pd.DataFrame], *, seed: int = 0) -> float:
+    """The gamma of `gamma_interval`, alone."""
+    return gamma_interval(tables, seed=seed)[0]
+
+
+def gamma_interval(tables: Sequence[pd.DataFrame], *, seed: int = 0) -> tuple[float, float, float]:
     """The gamma of Mathet, Widlöcher and Métivier (2015): agreement on where the annotations lie and what they say.
 
     Positions weigh three times what categories do (in pygamma-agreement 0.5.9 both weigh 1 by default). Chance is found
-    by drawing annotations at random, hence the seed. NaN when an annotator has no annotation.
+    by drawing annotations at random, hence the seed, and the interval.
+
+    Returns
+    -------
+    (float, float, float)
+        Gamma, and the ends of the interval in which it lies for all that is drawn (95 %: so many are drawn that the
+        disorder of chance is known to 2 %). It says nothing of other takes or annotators. NaN when an annotator has no
+        annotation.
 
     Raises
     ------
@@ -214,7 +229,7 @@ def gamma(tables: Sequence[pd.DataFrame], *, seed: int = 0) -> float:
         pygamma-agreement is not installed.
     """
     if any(len(table) == 0 for table in tables):
-        return float("nan")
+        return (float("nan"),) * 3
     package = needed("pygamma_agreement", "agreement")
     from pyannote.core import Segment
 
@@ -227,11 +242,18 @@ def gamma(tables: Sequence[pd.DataFrame], *, seed: int = 0) -> float:
     try:
         logging.root.setLevel(logging.ERROR)  # it warns at every step that a faster solver could be installed
         np.random.seed(seed)  # noqa: NPY002
-        result = continuum.compute_gamma(package.CombinedCategoricalDissimilarity(alpha=3, beta=1))
+        dissimilarity = package.CombinedCategoricalDissimilarity(alpha=3, beta=1)
+        result = continuum.compute_gamma(dissimilarity, precision_level=GAMMA_PRECISION)
     finally:
         logging.root.setLevel(level)
         np.random.set_state(state)  # noqa: NPY002
-    return float(result.gamma)
+    low, high = result.approx_gamma_range
+    return float(result.gamma), float(low), float(high)
+
+
+def _gamma_columns(tables: Sequence[pd.DataFrame], seed: int, asked: bool) -> dict[str, float]:
+    found = gamma_interval(tables, seed=seed) if asked else (float("nan"),) * 3
+    return dict(zip(("gamma", "gamma_low", "gamma_high"), found, strict=True))
 
 
 def boundary_distances(first: pd.DataFrame, second: pd.DataFrame, *, overlap: float = OVERLAP) -> pd.DataFrame:
@@ -292,8 +314,8 @@ def agreement_table(
     -------
     DataFrame
         `annotators`, `annotations` (of each), `matched`, `agreement` (share of the time), `cohen_kappa`,
-        `modified_kappa`, `modified_kappa_max`, `krippendorff_alpha`, `gamma`, `start_ms` and `end_ms` (median
-        absolute distance of matched boundaries).
+        `modified_kappa`, `modified_kappa_max`, `krippendorff_alpha`, `gamma`, `gamma_low` and `gamma_high`
+        (`gamma_interval`), `start_ms` and `end_ms` (median absolute distance of matched boundaries).
 
     Examples
     --------
@@ -320,7 +342,7 @@ def agreement_table(
                 "modified_kappa": modified.kappa,
                 "modified_kappa_max": modified.kappa_max,
                 "krippendorff_alpha": krippendorff_alpha(labels),
-                "gamma": gamma([first, second], seed=seed) if with_gamma else float("nan"),
+                **_gamma_columns([first, second], seed, with_gamma),
                 "start_ms": 1000 * float(distances["start_s"].abs().median()),
                 "end_ms": 1000 * float(distances["end_s"].abs().median()),
             }
@@ -332,7 +354,7 @@ def agreement_table(
                 "annotators": "all",
                 "annotations": " / ".join(str(len(table)) for table in tables),
                 "krippendorff_alpha": krippendorff_alpha(frame_labels(tables)),
-                "gamma": gamma(tables, seed=seed) if with_gamma else float("nan"),
+                **_gamma_columns(tables, seed, with_gamma),
             }
         )
     table = pd.DataFrame(rows)

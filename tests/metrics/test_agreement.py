@@ -19,6 +19,7 @@ from signface.metrics.agreement import (
     confusion,
     frame_labels,
     gamma,
+    gamma_interval,
     krippendorff_alpha,
     match_annotations,
     modified_kappa,
@@ -174,9 +175,12 @@ def test_nothing_annotated_at_all_is_no_crash():
 
 def test_gamma_is_below_one_for_others_and_the_same_for_one_seed():
     pytest.importorskip("pygamma_agreement")
-    found = gamma([ONE, OTHER], seed=1)
-    assert found < 1.0
+    found, low, high = gamma_interval([ONE, OTHER], seed=1)
+    assert low <= found <= high < 1.0
+    assert high - low < 0.1
     assert found == gamma([ONE, OTHER], seed=1)
+    table = agreement_table({"one": ONE, "other": OTHER}, with_gamma=True, seed=1)
+    assert table.loc[0, ["gamma", "gamma_low", "gamma_high"]].tolist() == [found, low, high]
 
 
 def test_tiers_that_not_everybody_has_are_no_comparison():
