@@ -189,13 +189,24 @@ def by_chosen_rule(folds: list[Fold], label: str) -> list[tuple[Example, pd.Data
 
 def _by_tables(examples: list[Example], channel: str, tables: list[dict]) -> list[list[pd.DataFrame]]:
     """The events of a channel in each take, by each table of rules."""
+    halves = [examples[0::2], examples[1::2]]
+    found = Parallel(n_jobs=2)(delayed(_events)(half, channel, tables) for half in halves)
+    rows = []
+    for number in range(len(tables)):
+        row: list[pd.DataFrame] = [None] * len(examples)  # type: ignore[list-item]
+        row[0::2], row[1::2] = (half[number] for half in found)
+        rows.append(row)
+    return rows
+
+
+def _events(examples: list[Example], channel: str, tables: list[dict]) -> list[list[pd.DataFrame]]:
+    nothing = pd.DataFrame(columns=["start_s", "end_s", "value"])
     rows = []
     for table in tables:
-        row = []
-        for example in examples:
-            events = {e.channel: e.table for e in find_channels(example.descriptors, table, level=example.level)}
-            row.append(events.get(channel, pd.DataFrame(columns=["start_s", "end_s", "value"])))
-        rows.append(row)
+        found = (
+            {e.channel: e.table for e in find_channels(one.descriptors, table, level=one.level)} for one in examples
+        )
+        rows.append([events.get(channel, nothing) for events in found])
     return rows
 
 

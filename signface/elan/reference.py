@@ -26,7 +26,7 @@ from signface.elan.tiers import clean_name, tier_name
 from signface.elan.translation import MappingOrFile, as_mapping, tier_meanings, translated
 from signface.elan.vocabularies import vocabulary_of_tier
 from signface.errors import SignfaceError, SignfaceWarning
-from signface.label.vocabulary import AFFECT, INTENSITY, NONE, Vocabulary
+from signface.label.vocabulary import AFFECT, INTENSITY, NONE, UNKNOWN, Vocabulary
 from signface.segmentation.segments import Segments
 
 
@@ -60,10 +60,10 @@ def read_reference(
     -------
     Segments
         `start_s, end_s, kind, label`; `intensity` (1, 2, 3 or missing) where a tier `intensity@SIGNER` exists.
-        Annotations without a value are left out. Missing time values, which ELAN allows within a chain of
-        annotations, are spread evenly between the known ones. A lab's values are turned back into labels. Where the
-        vocabulary has no transitions, every annotation is a stable segment, and two of one label that touch are one
-        segment; the history says how many there were.
+        Annotations without a value are left out, and those in which a model abstained (`unknown`). Missing time
+        values, which ELAN allows within a chain of annotations, are spread evenly between the known ones. A lab's
+        values are turned back into labels. Where the vocabulary has no transitions, every annotation is a stable
+        segment, and two of one label that touch are one segment; the history says how many there were.
 
     Raises
     ------
@@ -226,7 +226,9 @@ def read_corrections(
         return None
     meaning = meanings[name][2] if name in meanings else {}
     before = _table([(start, end, meaning.get(value, value)) for start, end, value in written])
-    after = read_reference(file, signer, tier=tier, vocabulary=vocabulary, mapping=mapping).table
+    wide = AFFECT if vocabulary is None and tier == "affect" else vocabulary
+    wide = None if wide is None else wide.including(UNKNOWN)  # what a model did not know is there to be corrected
+    after = read_reference(file, signer, tier=tier, vocabulary=wide, mapping=mapping).table
     return before, after[["start_s", "end_s", "label"]]
 
 
@@ -288,7 +290,7 @@ def _checked_rows(
     allowed = set(vocabulary.allowed)
     for start, end, value in annotations:
         label = meaning.get(value, meaning.get(value.strip(), value.strip()))
-        if not label:
+        if not label or vocabulary.abstains(label):  # nobody said what it is
             continue
         if start is None or end is None or start >= end:
             raise SignfaceError(f"the annotation {label!r} on tier {name} has no duration or no time", file=file)

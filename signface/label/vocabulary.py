@@ -268,6 +268,20 @@ class Vocabulary:
         """The vocabulary with one value more, at its end, unless it has it."""
         return self if value in self.values else replace(self, values=(*self.values, value))
 
+    def abstains(self, label: str) -> bool:
+        """Whether a label says that a model did not know: `UNKNOWN`, or a transition from or to it.
+
+        Examples
+        --------
+        >>> from signface.label.vocabulary import AFFECT
+        >>> [AFFECT.abstains(label) for label in ("unknown", "Nunknown", "NJ")]
+        [True, True, False]
+        """
+        if UNKNOWN in self.values:
+            return False
+        wide = self.including(UNKNOWN)
+        return label == UNKNOWN or (wide.is_transition(label) and UNKNOWN in wide.split(label))
+
     def with_blank(self, value: str = NONE) -> Vocabulary:
         """The vocabulary with a value for what nobody annotated; itself where it has that value.
 

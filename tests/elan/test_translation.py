@@ -8,9 +8,12 @@ from signface.channels.rules import closed_vocabularies, read_channels
 from signface.cli.main import main
 from signface.elan.mapping import ChannelRule, read_mapping
 from signface.elan.mapping_draft import write_mapping
-from signface.elan.reference import read_reference, reference_vocabulary
+from signface.elan.reference import read_corrections, read_reference, reference_vocabulary
 from signface.elan.translation import tier_meanings, translated
+from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
+from signface.label.vocabulary import AFFECT
+from signface.segmentation.segments import Segments
 
 ROWS = [(200, 900, "br_raise"), (1500, 2100, "br_low"), (2400, 2900, "br_raise")]
 
@@ -116,3 +119,19 @@ def test_an_empty_folder_has_nothing_to_map(tmp_path, capsys):
     assert main(["elan", "map", str(tmp_path), "-o", str(tmp_path / "m.toml")]) == 2
     assert "holds no .eaf" in capsys.readouterr().err
     assert not (tmp_path / "m.toml").exists()
+
+
+def test_what_a_model_did_not_know_is_no_annotation_and_can_be_corrected(tmp_path):
+    table = pd.DataFrame(
+        [(0.0, 0.6, "stable", "N"), (0.6, 0.8, "transition", "Nunknown"), (0.8, 2.0, "stable", "unknown")],
+        columns=["start_s", "end_s", "kind", "label"],
+    )
+    file = tmp_path / "a.eaf"
+    write_eaf(Segments(table, name="a"), file, signer="S1", vocabulary=AFFECT.including("unknown"))
+    assert read_reference(file, "S1").table["label"].tolist() == ["N"]
+    file.write_text(file.read_text("utf-8").replace("ANNOTATION_VALUE>unknown<", "ANNOTATION_VALUE>J<"), "utf-8")
+    file.write_text(file.read_text("utf-8").replace("ANNOTATION_VALUE>Nunknown<", "ANNOTATION_VALUE>NJ<"), "utf-8")
+    assert read_reference(file, "S1").table["label"].tolist() == ["N", "NJ", "J"]
+    before, after = read_corrections(file, "S1")
+    assert before["label"].tolist() == ["N", "Nunknown", "unknown"]
+    assert after["label"].tolist() == ["N", "NJ", "J"]
