@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from signface.cli.options import (
+    add_clause_argument,
     add_settings_arguments,
     add_signer_arguments,
     add_solve_arguments,
@@ -52,13 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--classifier", default="default", metavar="NAME_OR_FILE", help="a shipped classifier or a .skops file"
     )
-    parser.add_argument(
-        "--clause",
-        action="append",
-        default=[],
-        metavar="NAME_OR_FILE",
-        help="a further model, of any tier, whose segments get a tier of their own; may be given several times",
-    )
+    add_clause_argument(parser)
     parser.add_argument("--signer", default="", metavar="NAME", help="names the tiers: affect@NAME")
     parser.add_argument("--video", type=Path, metavar="FILE", help="film of the take, linked in the .eaf")
     parser.add_argument(
@@ -129,7 +124,7 @@ def run(arguments: argparse.Namespace) -> int:
                 if arguments.figure:
                     save_picture(result, face, file.with_suffix(".png"))
                 print(f"{file}: {result}")
-                warn_of_jitter(result.descriptors)
+                warn_of_jitter(result.descriptors, result.jitter)
             except SignfaceError as error:
                 if len(takes) == 1 or error is model.exception():
                     raise

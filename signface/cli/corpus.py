@@ -7,7 +7,7 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from signface.cli.options import add_settings_arguments, add_solve_arguments, settings_from
+from signface.cli.options import add_clause_argument, add_settings_arguments, add_solve_arguments, settings_from
 from signface.cli.train import add_tier_arguments, tier_options
 from signface.errors import SignfaceError, counted
 from signface.progress import progress
@@ -47,10 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     run_.add_argument(
         "--classifier", default="default", metavar="NAME_OR_FILE", help="a shipped classifier or a .skops file"
     )
-    run_.add_argument(
-        "--clause", action="append", default=[], metavar="NAME_OR_FILE",
-        help="a further model, of any tier, whose segments get a tier of their own; may be given several times",
-    )  # fmt: skip
+    add_clause_argument(run_)
     add_settings_arguments(run_, EafOptions)
 
     signers = actions.add_parser(

@@ -152,7 +152,6 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
     """Show the corrections, compare before and after on takes held out, train on all and save."""
     from signface.corpus.examples import solve_corpus
     from signface.corpus.manifest import read_corpus
-    from signface.elan.mapping import read_mapping
     from signface.elan.reference import corpus_corrections
     from signface.evaluation.corrections import compare_corrections
     from signface.label.persistence import load_model, read_card, save_model
@@ -161,8 +160,7 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
     vocabulary = card.vocabulary.without_blank()
     corpus = read_corpus(arguments.corpus)
     files = [(entry.annotation, entry.signer) for entry in corpus if entry.annotation is not None]
-    mapping = None if arguments.mapping is None else read_mapping(arguments.mapping)
-    tables = corpus_corrections(files, tier=card.tier, vocabulary=vocabulary, mapping=mapping)
+    tables = corpus_corrections(files, tier=card.tier, vocabulary=vocabulary, mapping=arguments.mapping)
     for line in compare_corrections(tables):
         print(line)
     if arguments.output is None:
@@ -185,7 +183,7 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
             tier=card.tier,
             vocabulary=vocabulary,
             sparse=sparse,
-            mapping=mapping,
+            mapping=arguments.mapping,
             progress=shown,
         )
 

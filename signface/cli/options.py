@@ -166,6 +166,17 @@ def read_face_and_layout(settings: SolveSettings) -> tuple[FaceModel, MarkerLayo
     return face, None if settings.layout is None else read_layout(settings.layout, face)
 
 
+def add_clause_argument(parser: argparse.ArgumentParser) -> None:
+    """Add the further models of a take."""
+    parser.add_argument(
+        "--clause",
+        action="append",
+        default=[],
+        metavar="NAME_OR_FILE",
+        help="a further model, of any tier, whose segments get a tier of their own; may be given several times",
+    )
+
+
 def output_files(takes: list[Path], output: Path | None, suffix: str) -> list[Path]:
     """Where the results of several takes go.
 

@@ -36,7 +36,8 @@ def run(arguments: argparse.Namespace) -> None:
     segments = segment(descriptors)
     write_segments(segments, arguments.output)
     stable = int((segments.table["kind"] == "stable").sum())
-    said = f"; {jitter(descriptors)}" if descriptors.n_frames >= 3 else ""
+    found = jitter(descriptors) if descriptors.n_frames >= 3 else None
+    said = "" if found is None else f"; {found}"
     cut = f"{stable} stable, {len(segments) - stable} transitions in {descriptors.duration:.1f} s"
     print(f"{arguments.output}: {cut}{said}")
-    warn_of_jitter(descriptors)
+    warn_of_jitter(descriptors, found)

@@ -50,12 +50,8 @@ def tier_options(arguments: argparse.Namespace) -> dict[str, Any]:
         from signface.elan.vocabularies import read_vocabulary
 
         vocabulary = read_vocabulary(arguments.vocabulary)
-    mapping = None
-    if arguments.mapping is not None:
-        from signface.elan.mapping import read_mapping
-
-        mapping = read_mapping(arguments.mapping)
-    return {"tier": arguments.tier, "vocabulary": vocabulary, "sparse": arguments.sparse, "mapping": mapping}
+    sparse, mapping = arguments.sparse, arguments.mapping
+    return {"tier": arguments.tier, "vocabulary": vocabulary, "sparse": sparse, "mapping": mapping}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

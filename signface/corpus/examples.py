@@ -16,7 +16,7 @@ from signface.corpus.origin import Origin, Recipe, find_origin, make_recipe
 from signface.corpus.signers import find_signer, warn_of_unknown_rests
 from signface.corpus.store import DescriptorStore, open_store
 from signface.descriptors import Descriptors
-from signface.elan.translation import MappingOrFile
+from signface.elan.translation import MappingOrFile, as_mapping
 from signface.errors import SignfaceError, SignfaceWarning
 from signface.label.vocabulary import NONE, Vocabulary
 from signface.learn.examples import Example
@@ -99,7 +99,8 @@ def solve_corpus(
     store = open_store(corpus.folder)
     recipe = make_recipe(settings)
     known: dict[tuple[str, str | None], Recipe] = {}
-    entries, references, vocabulary = _references(entries, tier, vocabulary, sparse, mapping)
+    rules = None if mapping is None else as_mapping(mapping)
+    entries, references, vocabulary = _references(entries, tier, vocabulary, sparse, rules)
     origins = [find_origin(entry, corpus.folder, recipe_of(entry, recipe, known)) for entry in entries]
     named = tier.partition("@")[0]
     blank = not (sparse or vocabulary.transitions)

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 from signface.corpus.describing import stored_or_solved
 from signface.corpus.manifest import TakeEntry
-from signface.corpus.origin import SOLVING_CODE, Recipe, code_digest, find_origin, shipped_digest, take_name
+from signface.corpus.origin import SOLVING_CODE, Origin, Recipe, code_digest, find_origin, shipped_digest, take_name
 from signface.corpus.store import DescriptorStore
 from signface.errors import SignfaceError
 from signface.files import whole_file
@@ -181,7 +181,8 @@ def _annotate(job: Job, notes: list[str]) -> tuple[str, bool, str]:
             hint="install the same one everywhere",
         )
     origin = find_origin(job.entry, job.corpus, job.recipe)
-    ending = f"{DONE} {_annotation_key(job, origin.key)}"
+    further = [find_origin(job.entry, job.corpus, one.recipe) for one in job.further]
+    ending = f"{DONE} {_annotation_key(job, [origin, *further])}"
     if job.eaf.is_file() and _last_line(job.log) == ending:
         return BEFORE, False, ""
     store = DescriptorStore(job.corpus)
@@ -195,8 +196,8 @@ def _annotate(job: Job, notes: list[str]) -> tuple[str, bool, str]:
         return CORRECTED, solved, f"{job.eaf}: was worked in and stays as it is"
     model = _model(job.classifier, job.model)
     clauses = []
-    for one in job.further:
-        seen, _ = stored_or_solved(job.entry, find_origin(job.entry, job.corpus, one.recipe), store, job.corpus)
+    for one, its in zip(job.further, further, strict=True):
+        seen, _ = stored_or_solved(job.entry, its, store, job.corpus)
         clauses.append(find_clause(seen, _model(one.classifier, one.model), signer=one.signer))
     channels = job.options.channels or False
     annotation = annotate(descriptors, model, signer=job.signer, channels=channels, clauses=clauses)
@@ -206,12 +207,20 @@ def _annotate(job: Job, notes: list[str]) -> tuple[str, bool, str]:
     return DONE, solved, str(annotation)
 
 
-def _annotation_key(job: Job, descriptors: str) -> str:
-    """SHA-256 of all that an annotation depends on, from the key of the descriptors."""
+def _annotation_key(job: Job, origins: list[Origin]) -> str:
+    """SHA-256 of all that an annotation depends on, from the origins of its descriptors and of each further model's."""
     video = "" if job.entry.video is None else os.path.relpath(job.entry.video, job.output)
-    content = [descriptors, job.model, job.code, job.options_digest, job.entry.signer, video, job.signer.level_digest]
-    for one in job.further:
-        content += [find_origin(job.entry, job.corpus, one.recipe).key, one.model, one.signer.level_digest]
+    content = [
+        origins[0].key,
+        job.model,
+        job.code,
+        job.options_digest,
+        job.entry.signer,
+        video,
+        job.signer.level_digest,
+    ]
+    for one, its in zip(job.further, origins[1:], strict=True):
+        content += [its.key, one.model, one.signer.level_digest]
     return hashlib.sha256("\n".join(content).encode()).hexdigest()
 
 

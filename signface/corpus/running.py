@@ -128,7 +128,7 @@ def run_corpus(
                 pass
             return _with_levels(jobs, store, card.bases)
 
-        seen_by = [with_levels(_solved_as(jobs, read_card(name)), read_card(name)) for name in clauses]
+        seen_by = [with_levels(_solved_as(jobs, card), card) for card in map(read_card, clauses)]
         jobs = with_levels(jobs, read_card(classifier))
         for name, same in zip(clauses, seen_by, strict=True):
             model = shipped_digest("classifiers", ".skops", name)

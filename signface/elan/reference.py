@@ -240,7 +240,8 @@ def corpus_corrections(
     mapping: MappingOrFile | None = None,
 ) -> list[tuple[pd.DataFrame, pd.DataFrame] | None]:
     """`read_corrections` of each annotation of a corpus, with its signer."""
-    return [read_corrections(f, signer, tier=tier, vocabulary=vocabulary, mapping=mapping) for f, signer in files]
+    rules = None if mapping is None else as_mapping(mapping)
+    return [read_corrections(f, signer, tier=tier, vocabulary=vocabulary, mapping=rules) for f, signer in files]
 
 
 def channel_labels(root: etree._Element) -> dict[str, tuple[str, dict[str, str]]]:

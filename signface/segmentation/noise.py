@@ -160,8 +160,14 @@ def jitter(
     return known[key]
 
 
-def warn_of_jitter(descriptors: Descriptors) -> None:
+def warn_of_jitter(descriptors: Descriptors, found: Jitter | None = None) -> None:
     """Warn (`SignfaceWarning`) where most of a take's energies is jitter of its tracker.
+
+    Parameters
+    ----------
+    descriptors : Descriptors
+    found : Jitter, optional
+        What `jitter` found in it, where that is known.
 
     Raises
     ------
@@ -175,7 +181,7 @@ def warn_of_jitter(descriptors: Descriptors) -> None:
     """
     if descriptors.n_frames < 3:
         return
-    found = jitter(descriptors)
+    found = jitter(descriptors) if found is None else found
     if found.most:
         warnings.warn(
             f"{descriptors.name}: {found.share:.0%} of the motion is jitter of the tracker: boundaries of segments are "

@@ -170,7 +170,7 @@ def solve_pieces(
             settings=settings,
             unobserved=unobserved,
         )
-        yield with_upright_brows(solved) if settings.method == "measures" else solved
+        yield with_upright_brows(solved)
 
 
 def face_and_layout(
