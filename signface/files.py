@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
 from os import PathLike
@@ -31,7 +32,8 @@ def whole_file(
     Parameters
     ----------
     path : path
-        The file to write. Its folder is created when missing.
+        The file to write. Its folder is created when missing. A file that is there keeps its mode, and a symbolic link
+        stays one: the file that it leads to is written.
     fsync : bool
         Whether what was written must be on the disk before it takes its name: a computer may lose its power.
     mark : str
@@ -51,13 +53,16 @@ def whole_file(
     """
     target = Path(path)
     try:
+        if target.is_symlink():
+            target = target.resolve()  # a ring of links is an OSError, one that leads nowhere yet makes the file there
         target.parent.mkdir(parents=True, exist_ok=True)
         ending = target.suffix if suffix is None else suffix
         handle, name = tempfile.mkstemp(prefix=f".{target.stem}-{mark}", suffix=ending, dir=target.parent)
         os.close(handle)
-    except OSError as error:
+    except (OSError, RuntimeError) as error:  # Python before 3.13 raises RuntimeError for a ring of links
+        reason = getattr(error, "strerror", None) or "symbolic links that lead to each other"
         raise SignfaceError(
-            f"cannot be written ({error.strerror})", file=target, hint="choose a folder you may write to"
+            f"cannot be written ({reason})", file=target, hint="choose a folder you may write to"
         ) from error
     temporary = Path(name)
     try:
@@ -67,7 +72,8 @@ def whole_file(
                 os.fsync(written.fileno())
         umask = os.umask(0)
         os.umask(umask)
-        temporary.chmod(0o666 & ~umask)  # mkstemp makes it private; a result is shared as any other file
+        # mkstemp makes it private; a result is shared as any other file, or as the file was that it replaces
+        temporary.chmod(stat.S_IMODE(target.stat().st_mode) if target.is_file() else 0o666 & ~umask)
         if target.is_dir():
             raise SignfaceError("is a folder, not a file", file=target, hint="name a file to write")
         temporary.replace(target)

@@ -1,5 +1,7 @@
 """Output files appear whole or not at all."""
 
+import os
+
 import pytest
 
 from signface.errors import SignfaceError
@@ -52,3 +54,31 @@ def test_a_folder_in_the_way_of_the_file_is_a_clear_error(tmp_path):
 def test_the_error_says_file_problem_and_hint_on_one_line():
     error = SignfaceError("has no\npoints", file="take.c3d", hint="export it again")
     assert str(error) == "take.c3d: has no points. Export it again"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there are no such modes")
+@pytest.mark.parametrize("mode", [0o600, 0o664, 0o640])
+def test_a_file_that_is_there_keeps_its_mode(tmp_path, mode):
+    target = tmp_path / "a.eaf"
+    target.write_text("old")
+    target.chmod(mode)
+    with whole_file(target) as temporary:
+        temporary.write_text("new")
+    assert (target.read_text(), target.stat().st_mode & 0o777) == ("new", mode)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links want a privilege there")
+def test_a_symbolic_link_stays_one_and_leads_to_what_was_written(tmp_path):
+    (tmp_path / "store").mkdir()
+    (tmp_path / "work").mkdir()
+    link = tmp_path / "work" / "a.eaf"
+    link.symlink_to("../store/a.eaf")
+    for text in ("first", "second"):  # it leads nowhere yet, then to a file
+        with whole_file(link) as temporary:
+            temporary.write_text(text)
+        assert link.is_symlink()
+        assert (tmp_path / "store" / "a.eaf").read_text() == text
+    ring = tmp_path / "ring"
+    ring.symlink_to(ring)
+    with pytest.raises(SignfaceError, match="ring: cannot be written"), whole_file(ring):
+        pass

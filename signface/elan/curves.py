@@ -33,6 +33,8 @@ class Curve:
 
     Parameters
     ----------
+    name : str
+        What the viewer calls it: up to some 14 letters fit beside a panel.
     description, units : str
     colour : (3,) tuple of int
         Red, green, blue, 0 to 255.
@@ -42,6 +44,7 @@ class Curve:
         Lowest and highest value drawn; found from the values when None.
     """
 
+    name: str
     description: str
     units: str
     colour: tuple[int, int, int]
@@ -49,25 +52,36 @@ class Curve:
     span: tuple[float, float] | None = None
 
 
-#: The panel of the weights.
-WEIGHTS = 3
+#: The panels of the weights: the confidence with brows and lids, and the mouth.
+UPPER, LOWER = 3, 4
+
+#: How many curves a panel can hold whose names and values can still be read.
+TRACKS = 5
+
+SHARE = (0.0, 1.0)
 
 #: Column of the csv: how it is drawn.
 CURVES = {
-    "velocity_energy": Curve("Sum of the absolute velocities of the weights (eq. 4.4)", "1/s", (0, 158, 115), 1),
-    "acceleration_energy": Curve("Sum of the absolute accelerations of the weights (eq. 4.5)", "1/s2", (213, 94, 0), 2),
-    "confidence": Curve("Confidence of the label of the segment", "", (0, 0, 0), WEIGHTS, (0.0, 1.0)),
-    "brows_up": Curve("Brows raised", "", (230, 159, 0), WEIGHTS, (0.0, 1.0)),
-    "brows_down": Curve("Brows lowered", "", (213, 94, 0), WEIGHTS, (0.0, 1.0)),
-    "lids_closed": Curve("Lids closed", "", (86, 180, 233), WEIGHTS, (0.0, 1.0)),
-    "lip_corners_up": Curve("Lip corners up", "", (0, 114, 178), WEIGHTS, (0.0, 1.0)),
-    "lip_corners_down": Curve("Lip corners down", "", (204, 121, 167), WEIGHTS, (0.0, 1.0)),
-    "jaw_open": Curve("Jaw open", "", (0, 158, 115), WEIGHTS, (0.0, 1.0)),
-    "residual_mm": Curve("Distance of the solved face from the markers", "mm", (153, 153, 153), 4),
+    "velocity_energy": Curve(
+        "velocity", "Sum of the absolute velocities of the weights (eq. 4.4)", "1/s", (0, 158, 115), 1
+    ),
+    "acceleration_energy": Curve(
+        "acceleration", "Sum of the absolute accelerations of the weights (eq. 4.5)", "1/s2", (213, 94, 0), 2
+    ),
+    "confidence": Curve("confidence", "Confidence of the label of the segment", "", (0, 0, 0), UPPER, SHARE),
+    "brows_up": Curve("brows up", "Brows raised", "", (230, 159, 0), UPPER, SHARE),
+    "brows_down": Curve("brows down", "Brows lowered", "", (213, 94, 0), UPPER, SHARE),
+    "lids_closed": Curve("lids closed", "Lids closed", "", (86, 180, 233), UPPER, SHARE),
+    "lip_corners_up": Curve("corners up", "Lip corners up", "", (0, 114, 178), LOWER, SHARE),
+    "lip_corners_down": Curve("corners down", "Lip corners down", "", (204, 121, 167), LOWER, SHARE),
+    "jaw_open": Curve("jaw open", "Jaw open", "", (0, 158, 115), LOWER, SHARE),
+    "residual_mm": Curve("residual", "Distance of the solved face from the markers", "mm", (153, 153, 153), 5),
 }
 
 #: Colours of the weights of bases that have no curve of their own above.
-OTHER_COLOURS = tuple(curve.colour for name, curve in CURVES.items() if curve.panel == WEIGHTS and name != "confidence")
+OTHER_COLOURS = tuple(
+    curve.colour for name, curve in CURVES.items() if curve.panel in (UPPER, LOWER) and name != "confidence"
+)
 
 
 def write_curves(table: pd.DataFrame, path: str | PathLike[str]) -> None:
@@ -122,7 +136,7 @@ def write_tsconf(
     for column, name in enumerate(table.columns[1:], start=1):
         curve = CURVES.get(name) or _other_curve(name, column)
         low, high = curve.span or _span(table[name].to_numpy(float))
-        track = etree.SubElement(source, "track", name=name, derivative="0")
+        track = etree.SubElement(source, "track", name=curve.name, derivative="0")
         etree.SubElement(track, "property", key="detect-range", value="false")
         position = etree.SubElement(track, "sample-position")
         etree.SubElement(position, "pos", row="0", col=str(column))
@@ -134,7 +148,7 @@ def write_tsconf(
 
 
 def panels(curves: str | PathLike[str]) -> dict[int, list[str]]:
-    """Which curves of a file are drawn in which panel of the viewer.
+    """The viewer's names of the curves of a file that are drawn together, by panel; never more than `TRACKS`.
 
     Raises
     ------
@@ -143,7 +157,11 @@ def panels(curves: str | PathLike[str]) -> dict[int, list[str]]:
     """
     drawn: dict[int, list[str]] = {}
     for column, name in enumerate(_read_curves(curves, nrows=0).columns[1:], start=1):
-        drawn.setdefault((CURVES.get(name) or _other_curve(name, column)).panel, []).append(name)
+        curve = CURVES.get(name) or _other_curve(name, column)
+        panel = curve.panel
+        if name not in CURVES and len(drawn.get(panel, ())) >= TRACKS:
+            panel = LOWER
+        drawn.setdefault(panel, []).append(curve.name)
     return dict(sorted(drawn.items()))
 
 
@@ -155,7 +173,8 @@ def _read_curves(curves: str | PathLike[str], nrows: int | None = None) -> pd.Da
 
 
 def _other_curve(name: str, column: int) -> Curve:
-    return Curve(f"Weight of {name}", "", OTHER_COLOURS[column % len(OTHER_COLOURS)], WEIGHTS, (0.0, 1.0))
+    short = name.replace("Left", "L").replace("Right", "R")  # bases of two sides are named so; others stay as they are
+    return Curve(short, f"Weight of {name}", "", OTHER_COLOURS[column % len(OTHER_COLOURS)], UPPER, SHARE)
 
 
 def _span(values: np.ndarray) -> tuple[float, float]:

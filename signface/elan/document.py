@@ -110,8 +110,8 @@ def parse_xml(path: str | PathLike[str]) -> etree._ElementTree:
 def write_document(tree: etree._ElementTree, path: str | PathLike[str]) -> None:
     """Write the tree as indented UTF-8, whole or not at all."""
     etree.indent(tree, space="    ")
-    with whole_file(path) as temporary:
-        tree.write(str(temporary), xml_declaration=True, encoding="UTF-8")
+    with whole_file(path) as temporary, temporary.open("wb") as stream:  # given a path, lxml takes a % in it for a URL
+        tree.write(stream, xml_declaration=True, encoding="UTF-8")
 
 
 def back_up(path: str | PathLike[str]) -> Path:

@@ -3,20 +3,15 @@
 - `TimeSlots`: the slots of new annotations, put in order among those that are there.
 - `tier_element`, `aligned_annotations`, `dependent_annotations`: tiers and what stands on them.
 - `type_element`, `vocabulary_element`: linguistic types and controlled vocabularies.
-- `add_media`, `add_link`: links to a video and to curves.
 """
 
 from __future__ import annotations
 
-import mimetypes
 from collections.abc import Callable, Mapping, Sequence
-from os import PathLike
-from pathlib import Path
 
 import numpy as np
 from lxml import etree
 
-from signface.elan.document import link_urls
 from signface.elan.tiers import clean_name
 from signface.label.vocabulary import Vocabulary
 
@@ -164,27 +159,3 @@ def vocabulary_element(vocabulary: Vocabulary, name: str) -> etree._Element:
             value.set("DESCRIPTION", entry.description)
         value.text = entry.value
     return element
-
-
-def add_media(header: etree._Element, video: str | PathLike[str], file: Path) -> None:
-    """MEDIA_DESCRIPTOR with absolute and relative URL, unless the header has it."""
-    absolute, relative = link_urls(video, file)
-    if any(media.get("MEDIA_URL") == absolute for media in header.iterfind("MEDIA_DESCRIPTOR")):
-        return
-    element = etree.Element("MEDIA_DESCRIPTOR", MEDIA_URL=absolute)
-    header.insert(len(header.findall("MEDIA_DESCRIPTOR")), element)
-    element.set("MIME_TYPE", mimetypes.guess_type(str(video))[0] or "video/mp4")
-    if relative is not None:
-        element.set("RELATIVE_MEDIA_URL", relative)
-
-
-def add_link(header: etree._Element, linked: str | PathLike[str], file: Path) -> None:
-    """LINKED_FILE_DESCRIPTOR: `.xml` as text/xml, anything else as text/plain; unless the header has it."""
-    absolute, relative = link_urls(linked, file)
-    if any(link.get("LINK_URL") == absolute for link in header.iterfind("LINKED_FILE_DESCRIPTOR")):
-        return
-    element = etree.Element("LINKED_FILE_DESCRIPTOR", LINK_URL=absolute)
-    header.insert(len(header.findall("MEDIA_DESCRIPTOR")) + len(header.findall("LINKED_FILE_DESCRIPTOR")), element)
-    element.set("MIME_TYPE", "text/xml" if str(linked).lower().endswith(".xml") else "text/plain")
-    if relative is not None:
-        element.set("RELATIVE_LINK_URL", relative)

@@ -17,6 +17,7 @@ from signface.elan.document import (
     WRITTEN_PREFIX,
     Row,
     fresh_ids,
+    get_property,
     last_annotation_number,
     named,
     recorded,
@@ -40,6 +41,9 @@ from signface.elan.tiers import Tier, clean_name, tier_name
 from signface.elan.upgrade import insert_in_order
 from signface.errors import SignfaceError
 from signface.label.vocabulary import AFFECT, Vocabulary
+
+#: Ending of the names of our types and vocabularies where the lab has others of that name.
+OURS = " (signface)"
 
 
 @dataclass
@@ -163,6 +167,13 @@ def _target(
         raise SignfaceError(
             f"has no tier {tier_id}, to which the mapping sends {channel}", file=file, hint=f"its tiers are {names}"
         )
+    if element is not None and channel not in mapping and not _is_ours(root, element):
+        named_by = "" if tier.signer else "name the signer (--signer), whose tiers then have names of their own, or "
+        raise SignfaceError(
+            f"the tier {tier_id} is not signface's, although it has the name of ours",
+            file=file,
+            hint=f"{named_by}say in a mapping where {channel} goes (signface elan map)",
+        )
     aligned = parent is None
     if element is not None:
         kind = stereotype(root, element)
@@ -208,6 +219,13 @@ def _target(
         entries or {},
         vocabulary if element is None else None,
         _meaning(labels, values),
+    )
+
+
+def _is_ours(root: etree._Element, tier: etree._Element) -> bool:
+    """Whether signface made a tier: it says so, or the header keeps what was written on it."""
+    return tier.get("ANNOTATOR") == "signface" or (
+        get_property(root, WRITTEN_PREFIX + (tier.get("TIER_ID") or "")) is not None
     )
 
 
@@ -288,7 +306,7 @@ def _write(
 def _type(root: etree._Element, target: _Target) -> str:
     """Name of a linguistic type for a tier of ours; it and its vocabulary are added unless the like is there."""
     wanted = type_element(target.channel, _vocabulary(root, target), dependent=not target.aligned)
-    for name in (target.channel, f"{target.channel} (signface)"):
+    for name in (target.channel, target.channel + OURS):
         kind = named(root, "LINGUISTIC_TYPE", name)
         if kind is None:
             wanted.set("LINGUISTIC_TYPE_ID", name)
@@ -308,7 +326,7 @@ def _vocabulary(root: etree._Element, target: _Target) -> str | None:
     vocabulary = target.vocabulary
     if vocabulary is None:
         return None
-    for name in (vocabulary.name, f"{vocabulary.name} (signface)"):
+    for name in (vocabulary.name, vocabulary.name + OURS):
         element = named(root, "CONTROLLED_VOCABULARY", name)
         if element is None:
             if named(root, "LANGUAGE", LANGUAGE["LANG_ID"]) is None:

@@ -215,5 +215,5 @@ def write_tier_file(path: str | PathLike[str], tier: Tier, *, with_dependents: S
         etree.SubElement(span, "v").text = value
         for child in dependents:
             etree.SubElement(span, "v").text = child.values[number] or ""
-    with whole_file(path) as temporary:
-        etree.ElementTree(root).write(str(temporary), xml_declaration=True, encoding="UTF-8", pretty_print=True)
+    with whole_file(path) as temporary, temporary.open("wb") as stream:
+        etree.ElementTree(root).write(stream, xml_declaration=True, encoding="UTF-8", pretty_print=True)

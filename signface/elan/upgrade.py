@@ -1,10 +1,17 @@
 """Documents of EAF 2.5 to 2.8 as EAF 3.0, and where a new element belongs in a document.
 
+- `upgrade`: the document; `is_before_28`: whether its annotations refer to their vocabulary by value alone.
+- `insert_in_order`: a child of the root where the schema wants it.
+
 What changed on the way (comments of the schemas): 2.8 moved the entries of controlled vocabularies from `CV_ENTRY` to
-the multilingual `CV_ENTRY_ML` and their description from an attribute to an element; everything else was added.
+the multilingual `CV_ENTRY_ML` and their description from an attribute to an element; everything else was added. An
+annotation now belongs to its entry by `CVE_REF`. ELAN finds the entry by the value only while it loads a file before
+2.8, so that annotations without it would be cut from their vocabulary.
 """
 
 from __future__ import annotations
+
+import re
 
 from lxml import etree
 
@@ -44,23 +51,56 @@ def insert_in_order(root: etree._Element, element: etree._Element) -> None:
     root.insert(position, element)
 
 
+def is_before_28(root: etree._Element) -> bool:
+    """Whether a document is of a format before EAF 2.8, as ELAN tells it (`FORMAT`, else `VERSION`)."""
+    match = re.match(r"(\d+)\.(\d+)", (root.get("FORMAT") or root.get("VERSION") or "").strip())
+    return match is not None and (int(match[1]), int(match[2])) < (2, 8)
+
+
 def upgrade(root: etree._Element) -> None:
-    """Make a document EAF 3.0, keeping everything it holds."""
+    """Make a document EAF 3.0 with all it holds; its annotations then refer to the entries of their vocabulary."""
+    every = is_before_28(root)
+    entries = {}
     for vocabulary in root.iterfind("CONTROLLED_VOCABULARY"):
-        _upgrade_vocabulary(root, vocabulary)
+        if _upgrade_vocabulary(root, vocabulary) or every:
+            entries[vocabulary.get("CV_ID")] = _identifiers(vocabulary)
+    _refer_to_entries(root, entries)
     root.set("VERSION", "3.0")
     root.set("FORMAT", "3.0")
     root.set(f"{{{XSI}}}noNamespaceSchemaLocation", SCHEMA_URL)
 
 
-def _upgrade_vocabulary(root: etree._Element, vocabulary: etree._Element) -> None:
+def _identifiers(vocabulary: etree._Element) -> dict[str, str]:
+    """Value and identifier of each entry; of two with one value the first, as ELAN has it."""
+    identifiers: dict[str, str] = {}
+    for entry in vocabulary.iterfind("CV_ENTRY_ML"):
+        for value in entry.iterfind("CVE_VALUE"):
+            identifiers.setdefault(value.text or "", entry.get("CVE_ID") or "")
+    return identifiers
+
+
+def _refer_to_entries(root: etree._Element, entries: dict[str | None, dict[str, str]]) -> None:
+    """Give annotations of these vocabularies the `CVE_REF` of the entry with their value, where they have none."""
+    types = {kind.get("LINGUISTIC_TYPE_ID"): kind for kind in root.iterfind("LINGUISTIC_TYPE")}
+    for tier in root.iterfind("TIER"):
+        kind = types.get(tier.get("LINGUISTIC_TYPE_REF"))
+        known = {} if kind is None else entries.get(kind.get("CONTROLLED_VOCABULARY_REF"), {})
+        for annotation in tier.iterfind("ANNOTATION/*") if known else ():
+            value = annotation.findtext("ANNOTATION_VALUE") or ""
+            if not annotation.get("CVE_REF") and known.get(value):
+                annotation.set("CVE_REF", known[value])
+
+
+def _upgrade_vocabulary(root: etree._Element, vocabulary: etree._Element) -> bool:
+    """Give a vocabulary multilingual entries; whether it had others."""
     description = vocabulary.attrib.pop("DESCRIPTION", None)
     if description:
         vocabulary.insert(0, etree.Element("DESCRIPTION", LANG_REF=_undetermined(root)))
         vocabulary[0].text = description
     used = {entry.get("CVE_ID") for entry in vocabulary.iterfind("CV_ENTRY_ML")}
     number = 0
-    for entry in vocabulary.findall("CV_ENTRY"):
+    old = vocabulary.findall("CV_ENTRY")
+    for entry in old:
         while f"cveid{number}" in used:
             number += 1
         used.add(f"cveid{number}")
@@ -73,6 +113,7 @@ def _upgrade_vocabulary(root: etree._Element, vocabulary: etree._Element) -> Non
         value.text = entry.text
         new.tail = entry.tail
         vocabulary.replace(entry, new)
+    return bool(old)
 
 
 def _undetermined(root: etree._Element) -> str:

@@ -12,7 +12,6 @@ import datetime
 import json
 import tempfile
 import uuid
-from collections.abc import Iterable
 from collections.abc import Mapping as MappingABC
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -41,12 +40,13 @@ from signface.elan.document import (
     tier_rows,
     write_document,
 )
-from signface.elan.elements import CONSTRAINTS, add_link, add_media
+from signface.elan.elements import CONSTRAINTS
+from signface.elan.links import curve_files, link_curves, link_media, warn_of_curves
 from signface.elan.mapping import read_mapping
 from signface.elan.merging import put_tiers
 from signface.elan.preferences import write_preferences
 from signface.elan.tiers import Tier, doubtful_tier, label_tier, xml_text
-from signface.elan.upgrade import upgrade
+from signface.elan.upgrade import is_before_28, upgrade
 from signface.errors import SignfaceError
 from signface.label.vocabulary import AFFECT, Vocabulary
 from signface.segmentation.segments import Segments
@@ -55,9 +55,6 @@ from signface.signer import Signer
 
 if TYPE_CHECKING:
     from pympi.Elan import Eaf
-
-#: What ELAN knows a description of curves by.
-TSCONF = "_tsconf.xml"
 
 
 class Results(Protocol):
@@ -203,12 +200,10 @@ def prepare(
     file = Path(path if into is None else into)  # type: ignore[arg-type]
     if into is None:
         check_writable(file, replace=replace)
-        root = _new_document() if options.template is None else _read_template(options.template)
+        root, old = (_new_document(), False) if options.template is None else _read_template(options.template)
         root.set("AUTHOR", xml_text(options.author))
     else:
-        root = read_document(file).getroot()
-        check_document(root, file)
-        upgrade(root)
+        root, old = _read_upgraded(file)
     curves, tiers, facts = None, [], dict(properties or {})
     if isinstance(annotation, Segments):
         segments, signer = annotation, signer or ""
@@ -228,12 +223,20 @@ def prepare(
         tiers = [doubtful_tier(segments, signer, below=options.doubtful, channel=tier, vocabulary=vocabulary), *tiers]
     all_tiers = (label_tier(segments, signer, channel=tier, vocabulary=vocabulary), *tiers)
     rules = {} if options.mapping is None else read_mapping(options.mapping)
-    links = () if curves is None else _curve_files(root, file)
+    links: tuple[Path, ...] = ()
+    if curves is not None:
+        links, hidden_by = curve_files(root, file)
+        warn_of_curves(links[-1], file, hidden_by)
     source = file if into is not None or options.template is None else Path(options.template)
     changed = put_tiers(root, all_tiers, mapping=rules, replace=replace, file=source)
+    header = root.find("HEADER")
+    if video is not None:
+        changed |= link_media(header, video, file)
+    if links:
+        changed |= link_curves(header, links, file)
     if changed or into is None:
         root.set("DATE", iso_date(date))
-        _fill_header(root, file, segments, video, facts, links)
+        _say_what_wrote(root, segments, facts)
     keep_previous = True
     if into is None:
         rows = tier_rows(root)
@@ -242,7 +245,10 @@ def prepare(
         set_property(root, f"{PROPERTY_PREFIX}tiers", json.dumps(list(rows), ensure_ascii=False))
         same = _untouched(file) and recorded(read_document(file).getroot()) == recorded(root)
         keep_previous, changed = file.is_file() and not same, True
-    return PreparedDocument(file, root.getroottree(), all_tiers, links, curves, keep_previous, changed, date)
+    template = options.template if into is None else None
+    return PreparedDocument(
+        file, root.getroottree(), all_tiers, links, curves, keep_previous, changed, date, old, template
+    )
 
 
 def to_pympi(annotation: Results | Segments, *, options: EafOptions | None = None, signer: str | None = None) -> Eaf:
@@ -286,6 +292,10 @@ class PreparedDocument(Content):
         Whether the document has to be written.
     date : datetime or str, optional
         The date in the description of the curves.
+    old : bool
+        Whether the file that is there, or the template, is of a format before EAF 2.8.
+    template : path, optional
+        What the document was made from, whose preferences are taken over.
     """
 
     file: Path
@@ -296,6 +306,8 @@ class PreparedDocument(Content):
     keep_previous: bool = False
     changed: bool = True
     date: datetime.datetime | str | None = None
+    old: bool = False
+    template: str | None = None
 
     def store(self) -> list[Path]:
         """Write the curves, the document, its colours, and the backup of what was there.
@@ -313,8 +325,14 @@ class PreparedDocument(Content):
             if self.keep_previous:
                 back_up(self.file)
             write_document(self.tree, self.file)
-            curves = self.links[0] if self.links else None
-            write_preferences(self.file.with_suffix(".pfsx"), self.tiers, curves=curves)
+        write_preferences(
+            self.file.with_suffix(".pfsx"),
+            self.tiers,
+            root=self.tree.getroot(),
+            curves=self.links[0] if len(self.links) > 1 else None,
+            old=self.old and self.changed,
+            template=self.template,
+        )
         return [self.file, *self.links]
 
 
@@ -343,18 +361,6 @@ def _untouched(file: Path) -> bool:
         return False  # not an EAF of ours, whatever it is
 
 
-def _curve_files(root: etree._Element, file: Path) -> tuple[Path, ...]:
-    """The curves' csv and its description, which is left out where the file links one of others.
-
-    ELAN reads only one description of curves.
-    """
-    curves, description = file.with_suffix(".curves.csv"), file.with_name(file.stem + TSCONF)
-    links = root.iterfind("HEADER/LINKED_FILE_DESCRIPTOR")
-    names = [(link.get("LINK_URL") or "").rpartition("/")[2] for link in links]
-    others = any(name.endswith(TSCONF) and name != description.name for name in names)
-    return (curves,) if others else (curves, description)
-
-
 def _new_document() -> etree._Element:
     """The root of a document without tiers."""
     root = etree.Element("ANNOTATION_DOCUMENT", nsmap={"xsi": XSI})
@@ -369,11 +375,18 @@ def _new_document() -> etree._Element:
     return root
 
 
-def _read_template(template: str | PathLike[str]) -> etree._Element:
-    """The root of a template as EAF 3.0, without annotations, time slots, links between annotations and media."""
-    root = read_document(template).getroot()
-    check_document(root, Path(template))
+def _read_upgraded(path: str | PathLike[str]) -> tuple[etree._Element, bool]:
+    """The root of a document without problems as EAF 3.0, and whether it was of a format before EAF 2.8."""
+    root = read_document(path).getroot()
+    check_document(root, Path(path))
+    old = is_before_28(root)
     upgrade(root)
+    return root, old
+
+
+def _read_template(template: str | PathLike[str]) -> tuple[etree._Element, bool]:
+    """As `_read_upgraded`, without annotations, time slots, links between annotations and media."""
+    root, old = _read_upgraded(template)
     for annotation in root.findall("TIER/ANNOTATION"):
         annotation.getparent().remove(annotation)
     for element in [
@@ -384,24 +397,12 @@ def _read_template(template: str | PathLike[str]) -> etree._Element:
         *root.findall("HEADER/PROPERTY"),
     ]:
         element.getparent().remove(element)
-    return root
+    return root, old
 
 
-def _fill_header(
-    root: etree._Element,
-    file: Path,
-    segments: Segments,
-    video: str | PathLike[str] | None,
-    properties: MappingABC[str, str],
-    linked_files: Iterable[str | PathLike[str]],
-) -> None:
-    """Media, links, and the properties that say what wrote the tiers and from what."""
-    header = root.find("HEADER")
-    if video is not None:
-        add_media(header, video, file)
-    for linked in linked_files:
-        add_link(header, linked, file)
-    details = {"tool": "signface", "version": version("signface"), "take": segments.name, **properties}
+def _say_what_wrote(root: etree._Element, segments: Segments, facts: MappingABC[str, str]) -> None:
+    """The properties that say what wrote the tiers and from what."""
+    details = {"tool": "signface", "version": version("signface"), "take": segments.name, **facts}
     if segments.history:
         details.setdefault("history", "; ".join(segments.history))
     for name, value in details.items():

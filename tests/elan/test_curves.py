@@ -9,7 +9,7 @@ from lxml import etree
 
 from signface.annotation import Annotation
 from signface.descriptors import Descriptors
-from signface.elan.curves import write_curves, write_tsconf
+from signface.elan.curves import CURVES, panels, write_curves, write_tsconf
 from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError
 from signface.segmentation.curves import curves_table
@@ -93,17 +93,16 @@ def test_the_description_points_at_the_columns_it_names(tmp_path):
     assert table.columns[int(source.get("time-column"))] == "#time_s"
     for track in source.iterfind("track"):
         name, column = track.get("name"), int(track.find("sample-position/pos").get("col"))
-        assert table.columns[column] == name
+        assert CURVES[table.columns[column]].name == name
         low, high = float(track.find("range").get("min")), float(track.find("range").get("max"))
-        assert low <= table[name].min()
-        assert table[name].max() <= high
+        assert low <= table.iloc[:, column].min()
+        assert table.iloc[:, column].max() <= high
         assert [child.tag for child in track] == [
             "property", "sample-position", "description", "units", "range", "color"
         ]  # fmt: skip
         assert len(track.findtext("color").split(",")) == 3
     names = [track.get("name") for track in source.iterfind("track")]
-    assert names == ["velocity_energy", "acceleration_energy", "confidence", "brows_up", "lids_closed", "jaw_open",
-                     "residual_mm"]  # fmt: skip
+    assert names == ["velocity", "acceleration", "confidence", "brows up", "lids closed", "jaw open", "residual"]
 
 
 def test_the_eaf_links_both_files_and_elan_shows_the_curves(tmp_path):
@@ -120,4 +119,15 @@ def test_the_eaf_links_both_files_and_elan_shows_the_curves(tmp_path):
     preferences = etree.parse(tmp_path / "take.pfsx").getroot()
     shown = {text.text for text in preferences.iterfind("prefList/String")}
     assert shown == {track.get("name") for track in etree.parse(tsconf).iterfind("tracksource/track")}
-    assert preferences.findtext("pref[@key='TimeSeriesViewer.NumberOfPanels']/Int") == "4"
+    assert preferences.findtext("pref[@key='TimeSeriesViewer.NumberOfPanels']/Int") == "5"
+
+
+@pytest.mark.parametrize(
+    "bases", [("AU01_r",), tuple(f"mouthShapeLeft{k}" for k in range(9)), ("browInnerUp", "jawOpen")]
+)
+def test_no_panel_holds_more_curves_than_can_be_read(tmp_path, bases):
+    write_curves(curves_table(descriptors(names=bases), labelled()), tmp_path / "take.curves.csv")
+    drawn = panels(tmp_path / "take.curves.csv")
+    assert max(map(len, drawn.values())) <= 5
+    names = [name for panel in drawn.values() for name in panel]
+    assert len(set(names)) == len(names) == len(pd.read_csv(tmp_path / "take.curves.csv").columns) - 1

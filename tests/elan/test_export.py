@@ -100,12 +100,6 @@ def test_elan_finds_a_colour_for_every_entry(tmp_path):
         assert all(0 <= int(part) <= 255 for part in colour.text.split(","))
 
 
-def test_an_annotators_preferences_are_left_alone(tmp_path):
-    (tmp_path / "take.pfsx").write_text("<preferences>mine</preferences>")
-    write_eaf(labelled(), tmp_path / "take.eaf", signer="S1")
-    assert (tmp_path / "take.pfsx").read_text() == "<preferences>mine</preferences>"
-
-
 def test_same_input_and_date_give_the_same_bytes(tmp_path):
     written = []
     for name in ("a", "b"):

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 from lxml import etree
 
+from signface.annotation import Annotation
+from signface.channels.events import ChannelEvents
 from signface.elan.document import read_document, tier_rows
 from signface.elan.mapping import ChannelRule, read_mapping
 from signface.elan.mapping_draft import suggest_mapping
@@ -14,6 +17,8 @@ from signface.elan.writing import prepare, write_eaf
 from signface.errors import SignfaceError
 from signface.label.vocabulary import AFFECT
 from signface.settings.eaf import EafOptions
+from signface.signer import Signer
+from tests.elan.test_curves import descriptors
 from tests.fixtures.elan_files import assert_valid, labelled, mapped, read_back
 
 LAB = """<?xml version="1.0" encoding="UTF-8"?>
@@ -414,3 +419,41 @@ def test_a_broken_mapping_is_explained(tmp_path, text, message):
 def test_a_tier_refuses_annotations_that_overlap():
     with pytest.raises(SignfaceError, match="overlap"):
         Tier("brows", "S1", np.array([0, 5]), np.array([10, 20]), ("raised", "raised"))
+
+
+OWN_NAMES = LAB.replace(
+    '  <LINGUISTIC_TYPE LINGUISTIC_TYPE_ID="gloss"',
+    "".join(f'  <TIER TIER_ID="{name}" LINGUISTIC_TYPE_REF="gloss"/>\n' for name in ("affect", "brows@S1", "intensity"))
+    + '  <LINGUISTIC_TYPE LINGUISTIC_TYPE_ID="gloss"',
+    1,
+)
+
+
+def test_a_labs_tier_that_has_the_name_of_ours_is_not_ours(tmp_path):
+    path = tmp_path / "lab.eaf"
+    path.write_text(OWN_NAMES, "utf-8")
+    with pytest.raises(SignfaceError, match=r"tier affect is not signface's.*Name the signer"):
+        write_eaf(labelled(), into=path)
+    assert path.read_text("utf-8") == OWN_NAMES
+    assert not list(tmp_path.glob("*.bak*"))
+    write_eaf(labelled(), into=path, signer="S1")
+    assert read_back(path, "affect") == []
+    rows = pd.DataFrame({"start_s": [0.5], "end_s": [1.0], "value": ["raised"]})
+    brows = ChannelEvents("brows", "", {"raised": "brows raised"}, rows)
+    found = Annotation(descriptors(), labelled(), "forest", signer=Signer("S1"), channels={"brows": brows})
+    with pytest.raises(SignfaceError, match="tier brows@S1 is not signface's") as refused:
+        write_eaf(found, into=path)
+    assert "--signer" not in str(refused.value)
+    rules = {"brows": ChannelRule("brows@{signer}")}
+    write_eaf(found, into=path, options=mapped(tmp_path, rules, curves=False))
+    assert [row[:3] for row in read_back(path, "brows@S1")] == [(500, 1000, "raised")]
+
+
+def test_a_tier_of_ours_stays_ours_after_others_have_written_the_file(tmp_path):
+    path = tmp_path / "take.eaf"
+    write_eaf(labelled(), path)
+    text = path.read_text("utf-8")
+    for gone in (' ANNOTATOR="signface"', "signface:tiers"):  # either is enough
+        path.write_text(text.replace(gone, "", 1) if gone[0] == " " else text.replace(gone, "other"), "utf-8")
+        write_eaf(labelled("N NA A"), into=path, replace=True)
+        assert [row[2] for row in read_back(path, "affect")] == ["N", "NA", "A"]

@@ -1,0 +1,243 @@
+"""Links of an EAF to its film and its curves: each once, and found again where a file or a folder has moved.
+
+- `find_media`: which of the films of a document a file is.
+- `link_media`: a film; `link_curves`: the curves and their description.
+- `curve_files`: which files the curves of an EAF go to; `warn_of_curves`: where ELAN will not show them.
+
+An EAF names a file twice: by the absolute path of the machine that wrote it, and by the way to it from the EAF's own
+folder. Most shared files hold absolute paths of other machines. ELAN tries both, then looks for the name in the EAF's
+folder; so does signface before it takes a file for one that is not linked.
+"""
+
+from __future__ import annotations
+
+import mimetypes
+import os
+import re
+import unicodedata
+import warnings
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from urllib.parse import unquote
+
+from lxml import etree
+
+from signface.elan.document import link_urls
+from signface.errors import SignfaceWarning
+
+#: What ELAN knows a description of curves by, and what ours describes.
+TSCONF = "_tsconf.xml"
+CURVES_ENDING = ".curves.csv"
+
+#: Absolute and relative URL of an element.
+MEDIA = ("MEDIA_URL", "RELATIVE_MEDIA_URL")
+LINK = ("LINK_URL", "RELATIVE_LINK_URL")
+
+
+def find_media(header: etree._Element, video: str | PathLike[str], file: Path) -> etree._Element | None:
+    """The MEDIA_DESCRIPTOR of a film; None where the document at `file` does not link it.
+
+    It is found by its absolute path, by the way to it from the document, or, where neither leads to a file, by its
+    name if no other film has it.
+    """
+    return _find(header.findall("MEDIA_DESCRIPTOR"), MEDIA, video, file)
+
+
+def link_media(header: etree._Element, video: str | PathLike[str], file: Path) -> bool:
+    """Link a film unless the document does; whether anything changed. Where it moved, its descriptor is mended."""
+    element = find_media(header, video, file)
+    made = element is None
+    if element is None:
+        element = etree.Element("MEDIA_DESCRIPTOR")
+        header.insert(len(header.findall("MEDIA_DESCRIPTOR")), element)
+    elif _leads(element, MEDIA, video, file):
+        return False
+    _set(element, MEDIA, *link_urls(video, file))
+    if made:
+        element.set("MIME_TYPE", mimetypes.guess_type(str(video))[0] or "video/mp4")
+    return True
+
+
+def curve_files(root: etree._Element, file: Path) -> tuple[tuple[Path, ...], str | None]:
+    """The curves' csv and its description; without the latter where the document links one of others.
+
+    Returns
+    -------
+    files : tuple of Path
+    hidden_by : str or None
+        The description of others: ELAN reads only one, so that it hides our curves.
+    """
+    curves, description = file.with_suffix(CURVES_ENDING), file.with_name(file.stem + TSCONF)
+    header = root.find("HEADER")
+    ours = _ours(header)
+    for link in header.iterfind("LINKED_FILE_DESCRIPTOR"):
+        name = _name(link)
+        if name.lower().endswith(TSCONF) and name != description.name and link not in ours:
+            return (curves,), name
+    return (curves, description), None
+
+
+def link_curves(header: etree._Element, files: Sequence[Path], file: Path) -> bool:
+    """Link the curves and their description, in place of those that we linked under another name or in another folder.
+
+    `.xml` is linked as text/xml, anything else as text/plain.
+
+    Returns
+    -------
+    bool
+        Whether anything changed.
+    """
+    wanted = [(*_curve_urls(linked, file), _mime(linked)) for linked in files]
+    ours = _ours(header)
+    names = {_plain_name(linked.name) for linked in files}
+    ours += [
+        link
+        for link in header.iterfind("LINKED_FILE_DESCRIPTOR")
+        if link not in ours and _plain_name(_name(link)) in names
+    ]
+    # What the document says of time (TIME_ORIGIN, ASSOCIATED_WITH) stays with the link
+    kept: list[etree._Element] = []
+    changed = False
+    for absolute, relative, mime in wanted:
+        ending = TSCONF if mime == "text/xml" else CURVES_ENDING
+        same = [link for link in ours if _name(link).lower().endswith(ending)]
+        if same:
+            element = same[0]
+        else:
+            element = etree.Element("LINKED_FILE_DESCRIPTOR")
+            place = len(header.findall("MEDIA_DESCRIPTOR")) + len(header.findall("LINKED_FILE_DESCRIPTOR"))
+            header.insert(place, element)
+        before = dict(element.attrib)
+        _set(element, LINK, absolute, relative)
+        element.set("MIME_TYPE", mime)
+        changed |= before != dict(element.attrib)
+        kept.append(element)
+    for link in ours:
+        if link not in kept:
+            header.remove(link)
+            changed = True
+    return changed
+
+
+def warn_of_curves(description: Path, file: Path, hidden_by: str | None) -> None:
+    """Warn where ELAN will not show the curves, or not for ever: what `curve_files` found hides them, or their path."""
+    if hidden_by is not None:
+        warnings.warn(
+            f"{file}: links {hidden_by}, and ELAN reads one description of curves: ours are written beside it and "
+            "linked, and not shown; take that link out in ELAN (Edit > Linked Files), or add our csv to it there",
+            SignfaceWarning,
+            stacklevel=3,
+        )
+    elif _beyond_ascii(description):
+        warnings.warn(
+            f"{file}: its path has letters outside ASCII, with which ELAN does not open curves by itself; they are "
+            "linked so that it does, until the file is saved in ELAN and then moved (annotate into it again there)",
+            SignfaceWarning,
+            stacklevel=3,
+        )
+
+
+def _beyond_ascii(file: Path) -> bool:
+    """Whether the path of a file holds letters outside ASCII, with which ELAN cannot open a description of curves."""
+    return not os.path.abspath(file).isascii()
+
+
+def _curve_urls(linked: Path, file: Path) -> tuple[str, str | None]:
+    """URLs of a file of curves.
+
+    ELAN (5.3 to 7.0) gives the description's URL to its XML parser, which refuses letters outside ASCII after `file:`
+    and takes `FILE:` for what it is.
+    """
+    absolute, relative = link_urls(linked, file)
+    if linked.name.endswith(TSCONF) and _beyond_ascii(linked):
+        absolute = "FILE:" + absolute.removeprefix("file:")
+    return absolute, relative
+
+
+def _ours(header: etree._Element) -> list[etree._Element]:
+    """The links to curves that signface wrote for a file of whatever name: the csv and the description of one stem."""
+    links = header.findall("LINKED_FILE_DESCRIPTOR")
+    stems = {name.removesuffix(CURVES_ENDING) for link in links if (name := _name(link)).endswith(CURVES_ENDING)}
+    return [
+        link
+        for link in links
+        if (name := _name(link)).endswith(CURVES_ENDING)
+        or (name.endswith(TSCONF) and name.removesuffix(TSCONF) in stems)
+    ]
+
+
+def _find(
+    elements: Sequence[etree._Element], attributes: tuple[str, str], target: str | PathLike[str], file: Path
+) -> etree._Element | None:
+    for element in elements:
+        if _leads(element, attributes, target, file):
+            return element
+    if _is_url(target):
+        return None
+    name = _plain_name(Path(target).name)
+    alike = [element for element in elements if _plain_name(_name(element, attributes)) == name]
+    if len(alike) == 1 and not any(place.exists() for place in _places(alike[0], attributes, file)):
+        return alike[0]
+    return None
+
+
+def _leads(element: etree._Element, attributes: tuple[str, str], target: str | PathLike[str], file: Path) -> bool:
+    """Whether one of an element's URLs leads to the target from the EAF at `file`."""
+    if element.get(attributes[0]) == link_urls(target, file)[0]:
+        return True
+    if _is_url(target):
+        return False
+    wanted = Path(os.path.abspath(target))
+    for place in _places(element, attributes, file):
+        if _plain(place) == _plain(wanted):
+            return True
+        if place.exists() and wanted.exists() and place.samefile(wanted):
+            return True
+    return False
+
+
+def _places(element: etree._Element, attributes: tuple[str, str], file: Path) -> list[Path]:
+    """Where an element's URLs lead on this machine, as they stand and percent-decoded."""
+    folder = Path(os.path.abspath(file)).parent
+    places = []
+    for attribute in attributes:
+        text = (element.get(attribute) or "").replace("\\", "/")
+        if not text or (_is_url(text) and not text.lower().startswith("file:")):
+            continue
+        for path in dict.fromkeys((text, unquote(text))):
+            path = re.sub(r"^(?i:file):(//(?=/))?", "", path)
+            path = re.sub(r"^/(?=[A-Za-z]:/|\.\.?/)", "", path)  # /C:/..., and ELAN's own file:/./...
+            places.append(Path(os.path.abspath(folder / path)))
+    return places
+
+
+def _is_url(target: str | PathLike[str]) -> bool:
+    return re.match(r"^[a-zA-Z][a-zA-Z0-9+.-]+://", os.fspath(target)) is not None
+
+
+def _plain(path: Path) -> str:
+    """A path in the form by which two are compared: macOS writes accents apart from their letters."""
+    return unicodedata.normalize("NFC", os.path.normcase(path))
+
+
+def _plain_name(name: str) -> str:
+    return unicodedata.normalize("NFC", unquote(name))
+
+
+def _name(element: etree._Element, attributes: tuple[str, str] = LINK) -> str:
+    """Name of the file that an element links."""
+    url = element.get(attributes[0]) or element.get(attributes[1]) or ""
+    return url.replace("\\", "/").rpartition("/")[2]
+
+
+def _mime(linked: Path) -> str:
+    return "text/xml" if linked.suffix.lower() == ".xml" else "text/plain"
+
+
+def _set(element: etree._Element, attributes: tuple[str, str], absolute: str, relative: str | None) -> None:
+    element.set(attributes[0], absolute)
+    if relative is not None:
+        element.set(attributes[1], relative)
+    else:
+        element.attrib.pop(attributes[1], None)
