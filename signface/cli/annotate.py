@@ -88,10 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.into is not None and getattr(arguments, "eaf_template", None) is not None:
         raise SignfaceError("--into and --template exclude each other", hint="the file of --into has its own tiers")
     files = [arguments.into] if arguments.into is not None else output_files(takes, arguments.output, ".eaf")
-    if options.mapping is not None:  # one that is none is said before anything is solved
-        from signface.elan.mapping import read_mapping
-
-        read_mapping(options.mapping)
+    _check_files(arguments.into, options)
     channels: bool | Mapping[str, Any] = False
     if options.channels is not None:  # pandas comes with it, which is otherwise imported beside the solve
         from signface.channels.rules import read_channels
@@ -133,6 +130,20 @@ def run(arguments: argparse.Namespace) -> int:
     if failed:
         print(f"signface: {failed} of {len(takes)} takes could not be annotated", file=sys.stderr)
     return 2 if failed else 0
+
+
+def _check_files(into: Path | None, options: EafOptions) -> None:
+    """Say before anything is solved what is wrong with the files that the result goes into."""
+    if options.mapping is not None:
+        from signface.elan.mapping import read_mapping
+
+        read_mapping(options.mapping)
+    there = into if into is not None else options.template
+    if there is not None:
+        from signface.elan.checking import check_document
+        from signface.elan.document import read_document
+
+        check_document(read_document(there).getroot(), Path(there))
 
 
 def _warn_of_affect(takes: list[Path], classifier: str) -> None:

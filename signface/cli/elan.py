@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from functools import partial
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -238,7 +239,7 @@ def install_recogniser(arguments: argparse.Namespace) -> None:
         print("  Linux    ELAN_x-x/lib/app/extensions")
         print("  macOS    ELAN_x-x.app/Contents/app/extensions")
         print("  Windows  ELAN_x-x\\app\\extensions")
-    print("Start ELAN again; signface is on the tab Recognizers > Video Recognizer.")
+    print("Start ELAN again; on the tab Recognizers, choose signface.")
 
 
 def recognise(arguments: argparse.Namespace) -> int:
@@ -260,14 +261,18 @@ def recognise(arguments: argparse.Namespace) -> int:
 
 def _recognise(xml: bytes) -> None:
     from signface.annotation import annotate
-    from signface.elan.recogniser import progress_line, read_parameters, write_tier_file
+    from signface.elan.recogniser import discard_tier_file, progress_line, read_parameters, write_tier_file
     from signface.elan.tiers import label_tier
     from signface.label.persistence import load_model
     from signface.settings.laboratory import read_settings
     from signface.signer import Signer
     from signface.takes.reading import read_recording
 
-    chosen = read_parameters(xml)
+    chosen, encoding = read_parameters(xml)
+    if encoding != "utf-8" and isinstance(sys.stdout, TextIOWrapper):  # ELAN reads as it writes
+        sys.stdout.reconfigure(encoding=encoding, errors="backslashreplace")
+    if "tiers" in chosen:
+        discard_tier_file(chosen["tiers"])
     for name, what in (("take", "recording"), ("tiers", "file for the tiers")):
         if name not in chosen:
             raise SignfaceError(f"no {what} was chosen", hint=f"choose it in the panel ({name})")

@@ -6,13 +6,15 @@ its progress lines, and reads the tier file that it was told to write (`LocalRec
 `XmlTierIO` in ELAN's sources).
 
 - `write_extension`, `extensions_folder`: the folder, and where it belongs.
-- `read_parameters`: what ELAN writes to standard input.
+- `read_parameters`: what ELAN writes to standard input; `discard_tier_file`: the result of an earlier run.
 - `progress_line`, `DONE`, `FAILED`: what it reads from standard output.
 - `write_tier_file`: the file it imports.
 """
 
 from __future__ import annotations
 
+import locale
+import re
 import stat
 import sys
 from collections.abc import Sequence
@@ -21,6 +23,7 @@ from pathlib import Path
 
 from lxml import etree
 
+from signface.elan.document import parse_xml
 from signface.elan.tiers import Tier
 from signface.errors import SignfaceError
 from signface.files import whole_file
@@ -56,6 +59,7 @@ export LC_ALL PYTHONUTF8
 exec {python} -m signface.cli.main elan recognise
 """
 BATCH = """@echo off\r
+chcp 65001 >nul\r
 set PYTHONUTF8=1\r
 {python} -m signface.cli.main elan recognise\r
 """
@@ -63,8 +67,10 @@ HELP = """<!DOCTYPE html>
 <html><head><meta charset="utf-8"><title>signface</title></head><body>
 <h1>signface</h1>
 <p>Annotates the face of a motion-captured take: expressions held and the transitions between them, each with a
-confidence. Choose the recording (take); everything else has a default. The result is that of
-<code>signface annotate</code>.</p>
+confidence. Choose the recording (take); everything else has a default. Labels and confidences are those of
+<code>signface annotate</code>, on plain tiers: what a recogniser gives to ELAN has no vocabulary, no dependent
+tiers, no colours and no curves. <code>signface annotate --into FILE.eaf</code> writes all of these into the file,
+while it is not open in ELAN.</p>
 <p>When it is done, ELAN offers to load the tiers. Progress and errors stand in the report.</p>
 </body></html>
 """
@@ -122,7 +128,7 @@ def write_extension(folder: str | PathLike[str], *, python: str | None = None) -
     contents = {
         "recognizer.cmdi": etree.tostring(cmdi(), xml_declaration=True, encoding="UTF-8", pretty_print=True),
         "signface.sh": SHELL.format(python=quoted).encode(),
-        "signface.bat": BATCH.format(python=f'"{program}"').encode(),
+        "signface.bat": BATCH.format(python='"' + program.replace("%", "%%") + '"').encode(),
         "signface.html": HELP.encode(),
     }
     written = []
@@ -169,17 +175,34 @@ def cmdi() -> etree._Element:
     return root
 
 
-def read_parameters(xml: bytes) -> dict[str, str]:
-    """The parameters that ELAN writes to standard input: name and value, those left empty not among them.
+def read_parameters(xml: bytes) -> tuple[dict[str, str], str]:
+    """The parameters that ELAN writes to standard input, and the code page that it writes and reads.
+
+    The first line says UTF-8, but ELAN's Java writes what its platform has: on Windows that is the code page of the
+    country (up to Java 17).
+
+    Returns
+    -------
+    parameters : dict of str to str
+        Name and value; those left empty are not among them.
+    encoding : str
 
     Raises
     ------
     SignfaceError
         The text is not what ELAN writes.
     """
+    for encoding in ("utf-8-sig", locale.getencoding(), "cp1252", "latin-1"):  # the last reads anything
+        try:
+            text = xml.decode(encoding)
+            break
+        except (UnicodeDecodeError, LookupError):
+            continue
+    text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text)
+    text = re.sub(r"&(?!#?\w+;)", "&amp;", text)  # a folder "Tom & Eva", which some versions write as it is
     parser = etree.XMLParser(resolve_entities=False, no_network=True)
     try:
-        root = etree.fromstring(xml.strip(), parser)
+        root = etree.fromstring(text.strip(), parser)
     except etree.XMLSyntaxError as error:
         raise SignfaceError(
             "what came in on standard input is no list of parameters", hint="this command is run by ELAN"
@@ -187,7 +210,27 @@ def read_parameters(xml: bytes) -> dict[str, str]:
     if root.tag != "PARAM":
         raise SignfaceError(f"expected PARAM on standard input, not {root.tag}", hint="this command is run by ELAN")
     values = {str(item.get("name")): (item.text or "").strip() for item in root.iterfind("param")}
-    return {name: value for name, value in values.items() if value}
+    return {name: value for name, value in values.items() if value}, encoding.removesuffix("-sig")
+
+
+def discard_tier_file(path: str | PathLike[str]) -> None:
+    """Remove the tiers of an earlier run: ELAN offers to load what is in the file also after a run that failed.
+
+    Raises
+    ------
+    SignfaceError
+        The file holds something else than a recogniser's tiers.
+    """
+    file = Path(path)
+    if not file.exists():
+        return
+    try:
+        ours = file.stat().st_size == 0 or parse_xml(file).getroot().tag == "TIER"
+    except SignfaceError:
+        ours = False
+    if not ours:
+        raise SignfaceError("holds something else than tiers", file=file, hint="choose another file for the tiers")
+    file.unlink()
 
 
 def progress_line(share: float, what: str) -> str:

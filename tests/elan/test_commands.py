@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import subprocess
 import sys
@@ -294,6 +295,10 @@ def test_a_failure_is_told_to_elan_in_its_own_words(tmp_path):
     assert any("none.c3d: no such file" in line for line in lines)
     lines, _ = play_elan(tmp_path / "signface", {"tiers": "x.xml"})
     assert any("no recording was chosen" in line for line in lines)
+    sent = SENT.replace("TAKE", "/tmp/Mü/none.c3d").replace("</PARAM>", '<param name="tiers">x.xml</param></PARAM>')
+    folder, pipe = tmp_path / "signface", subprocess.PIPE
+    done = subprocess.run(["./signface.sh"], cwd=folder, input=sent.encode("cp1252"), env={}, stdout=pipe, check=False)
+    assert "/tmp/Mü/none.c3d: no such file" in done.stdout.decode("cp1252")
 
 
 def test_the_recogniser_goes_where_elan_looks(tmp_path):
@@ -307,9 +312,63 @@ def test_the_recogniser_goes_where_elan_looks(tmp_path):
 
 def test_parameters_left_empty_are_not_given():
     xml = b'<?xml version="1.0"?>\n<PARAM><param name="a">1 &lt; 2</param><param name="b"></param></PARAM>\n'
-    assert read_parameters(xml) == {"a": "1 < 2"}
+    assert read_parameters(xml) == ({"a": "1 < 2"}, "utf-8")
     with pytest.raises(SignfaceError, match="run by ELAN"):
         read_parameters(b"hello")
+
+
+SENT = """<?xml version="1.0" encoding="UTF-8"?>\r
+<PARAM xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation="file:avatech-call.xsd">\r
+<param name="take">TAKE</param>\r
+</PARAM>\r
+"""
+
+
+@pytest.mark.parametrize(
+    ("platform", "encoding", "take"),
+    [
+        ("UTF-8", "utf-8", "C:\\Users\\Jürgen\\李.c3d"),
+        ("UTF-8", "cp1252", "C:\\Users\\Jürgen\\prise à côté.c3d"),
+        ("cp1252", "cp1252", "/tmp/Mü/prise €.c3d"),
+        ("cp1251", "cp1251", "C:\\Пётр\\дубль.c3d"),
+        ("cp932", "cp932", "C:\\撮影\\表情.c3d"),
+    ],
+)
+def test_parameters_come_in_the_code_page_of_the_platform(monkeypatch, platform, encoding, take):
+    monkeypatch.setattr("locale.getencoding", lambda: platform)
+    parameters, found = read_parameters(SENT.replace("TAKE", take).encode(encoding))
+    assert (parameters, found) == ({"take": take}, encoding)
+
+
+def test_an_ampersand_in_a_path_is_read_either_way():
+    for written in ("Tom & Eva", "Tom &amp; Eva"):
+        assert read_parameters(SENT.replace("TAKE", written).encode())[0] == {"take": "Tom & Eva"}
+
+
+def test_the_windows_script_finds_a_python_anywhere(tmp_path):
+    write_extension(tmp_path, python="C:\\Users\\Jürgen 100%\\python.exe")
+    lines = (tmp_path / "signface.bat").read_bytes().decode("utf-8").split("\r\n")
+    assert lines.index("chcp 65001 >nul") < 2
+    assert '"C:\\Users\\Jürgen 100%%\\python.exe" -m signface.cli.main elan recognise' in lines
+
+
+def run_recogniser(monkeypatch, parameters: dict[str, str]) -> int:
+    xml = etree.Element("PARAM")
+    for name, value in parameters.items():
+        etree.SubElement(xml, "param", name=name).text = value
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(etree.tostring(xml))))
+    return main(["elan", "recognise"])
+
+
+def test_a_run_that_fails_leaves_no_older_result(tmp_path, monkeypatch, capsys):
+    tiers, other = tmp_path / "tiers.xml", tmp_path / "lab.eaf"
+    write_tier_file(tiers, label_tier(labelled(), "S1"))
+    other.write_text(LAB, "utf-8")
+    assert run_recogniser(monkeypatch, {"take": str(tmp_path / "none.c3d"), "tiers": str(tiers)}) == 2
+    assert not tiers.exists()
+    assert run_recogniser(monkeypatch, {"take": str(tmp_path / "none.c3d"), "tiers": str(other)}) == 2
+    assert other.read_text("utf-8") == LAB
+    assert "lab.eaf: holds something else than tiers" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("step", [0.5, 0.123, 0.0333, 7.777])
@@ -330,3 +389,13 @@ def test_a_take_held_out_is_not_learnt_from_by_another_road(corpus, machine, tmp
     arguments = ["--before", str(machine), "--classifier", "knn1", "--with", str(corpus)]
     assert main(["elan", "learn", str(corpus), "-o", str(tmp_path / "mine.skops"), *arguments]) == 0
     assert "3 takes of the same name in --with are left out" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("option", ["--into", "--template"])
+def test_what_the_result_goes_into_is_looked_at_before_anything_is_solved(tmp_path, capsys, option):
+    take = ["annotate", str(tmp_path / "none.c3d")]
+    assert main([*take, option, str(tmp_path / "lab.eaf")]) == 2
+    assert "lab.eaf: no such file" in capsys.readouterr().err
+    (tmp_path / "lab.eaf").write_text("<x/>")
+    assert main([*take, option, str(tmp_path / "lab.eaf")]) == 2
+    assert "lab.eaf: is XML but no EAF" in capsys.readouterr().err
