@@ -2,6 +2,7 @@
 
 - `named`: an element by its name.
 - `read_document`: the tree of an EAF 2.5 to 3.0, or one clear error; `parse_xml`: of any of ELAN's files.
+- `file_of`: the file that a document was read from.
 - `write_document`: indented UTF-8, whole or not at all.
 - `link_urls`: absolute and relative URL of a linked file, as ELAN resolves them.
 - `written_record`, `recorded`: what signface wrote on a tier, kept in the header so that corrections can be told.
@@ -104,7 +105,14 @@ def parse_xml(path: str | PathLike[str]) -> etree._ElementTree:
         ) from error
     if tree.docinfo.internalDTD is not None:
         raise SignfaceError("declares a document type or entities of its own, which no EAF does", file=file)
+    tree.docinfo.URL = str(file)  # what it links relatively is looked for beside it
     return tree
+
+
+def file_of(root: etree._Element) -> Path | None:
+    """The file that a document was read from; None for one that was made here."""
+    url = root.getroottree().docinfo.URL
+    return None if url is None else Path(url)
 
 
 def write_document(tree: etree._ElementTree, path: str | PathLike[str]) -> None:

@@ -1,6 +1,6 @@
 """Links of an EAF to its film and its curves: each once, and found again where a file or a folder has moved.
 
-- `find_media`: which of the films of a document a file is.
+- `find_media`: which of the films of a document a file is; `places_of`: where a URL leads on this machine.
 - `link_media`: a film; `link_curves`: the curves and their description.
 - `curve_files`: which files the curves of an EAF go to; `warn_of_curves`: where ELAN will not show them.
 
@@ -199,12 +199,17 @@ def _leads(element: etree._Element, attributes: tuple[str, str], target: str | P
 
 def _places(element: etree._Element, attributes: tuple[str, str], file: Path) -> list[Path]:
     """Where an element's URLs lead on this machine, as they stand and percent-decoded."""
+    return [place for attribute in attributes for place in places_of(element.get(attribute) or "", file)]
+
+
+def places_of(url: str, file: Path) -> list[Path]:
+    """Where a URL in the document at `file` may lead on this machine: as it stands and percent-decoded.
+
+    None for an empty one and for one of the web.
+    """
     folder = Path(os.path.abspath(file)).parent
-    places = []
-    for attribute in attributes:
-        text = (element.get(attribute) or "").replace("\\", "/")
-        if not text or (_is_url(text) and not text.lower().startswith("file:")):
-            continue
+    text, places = url.replace("\\", "/"), []
+    if text and (not _is_url(text) or text.lower().startswith("file:")):
         for path in dict.fromkeys((text, unquote(text))):
             path = re.sub(r"^(?i:file):(//(?=/))?", "", path)
             path = re.sub(r"^/(?=[A-Za-z]:/|\.\.?/)", "", path)  # /C:/..., and ELAN's own file:/./...

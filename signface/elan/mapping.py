@@ -20,6 +20,7 @@ as ours (`signface.elan.translation`). `signface.elan.mapping_draft` writes a fi
 from __future__ import annotations
 
 import tomllib
+import warnings
 from collections.abc import Mapping as MappingABC
 from dataclasses import dataclass, field
 from os import PathLike
@@ -27,9 +28,9 @@ from pathlib import Path
 
 from lxml import etree
 
-from signface.elan.document import named
-from signface.elan.vocabularies import vocabulary_entries, vocabulary_name
-from signface.errors import SignfaceError
+from signface.elan.document import file_of, named
+from signface.elan.vocabularies import external_vocabulary, vocabulary_entries, vocabulary_name
+from signface.errors import SignfaceError, SignfaceWarning
 from signface.files import reading
 from signface.label.vocabulary import AFFECT, Vocabulary
 
@@ -111,11 +112,21 @@ def stereotype(root: etree._Element, tier: etree._Element) -> str | None:
 def closed_entries(root: etree._Element, tier: etree._Element) -> dict[str, str] | None:
     """Values and entry ids of a tier's closed vocabulary, in the tier's language where the vocabulary has it.
 
-    None where the tier has no vocabulary, or an external one, whose entries are not in the file.
+    None where the tier has no vocabulary, or one whose entries are in another file (`.ecv`) that is not here; the
+    latter with a `SignfaceWarning`.
     """
     name = vocabulary_name(root, tier)
     vocabulary = None if name is None else named(root, "CONTROLLED_VOCABULARY", name)
-    if vocabulary is None or vocabulary.get("EXT_REF"):
+    if vocabulary is not None and vocabulary.get("EXT_REF"):
+        vocabulary, where = external_vocabulary(root, vocabulary)
+        if vocabulary is None:
+            warnings.warn(
+                f"{file_of(root)}: the vocabulary {name} of the tier {tier.get('TIER_ID')} is kept in "
+                f"{where or 'another file'}, which is not here: its values are not checked; put it beside the file",
+                SignfaceWarning,
+                stacklevel=2,
+            )
+    if vocabulary is None:
         return None
     entries: dict[str, str] = {}
     for value, _, identifier in vocabulary_entries(vocabulary, tier.get("LANG_REF")):

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Iterable, Iterator
 from os import PathLike
@@ -13,7 +14,8 @@ from pathlib import Path
 
 from lxml import etree
 
-from signface.elan.document import named, parse_xml, read_document
+from signface.elan.document import file_of, named, parse_xml, read_document
+from signface.elan.links import places_of
 from signface.errors import SignfaceError
 from signface.files import reading, whole_file
 from signface.label.vocabulary import Colour, Entry, Vocabulary
@@ -93,9 +95,39 @@ def write_vocabulary(vocabulary: Vocabulary, path: str | PathLike[str]) -> None:
 def vocabulary_of_tier(root: etree._Element, tier: str, file: Path) -> Vocabulary | None:
     """The closed vocabulary of a tier of an EAF; None where it has none, or one that is kept elsewhere."""
     element = named(root, "CONTROLLED_VOCABULARY", vocabulary_name(root, named(root, "TIER", tier)))
+    if element is not None and element.get("EXT_REF"):
+        element = external_vocabulary(root, element)[0]
     if element is None or not any(vocabulary_entries(element, None)):
         return None
     return _from_element(element, _language(root, tier), file)
+
+
+def external_vocabulary(root: etree._Element, element: etree._Element) -> tuple[etree._Element | None, str]:
+    """The vocabulary that a document keeps in another file (`.ecv`), and where that is.
+
+    The file is looked for where the document says, and by its name beside the document, since most documents hold the
+    path of another machine. It is not fetched from the web.
+
+    Returns
+    -------
+    vocabulary : element or None
+        None where the file, or the vocabulary in it, is not here.
+    where : str
+        As the document has it.
+    """
+    reference = named(root, "EXTERNAL_REF", element.get("EXT_REF"))
+    url = "" if reference is None else reference.get("VALUE") or ""
+    document = file_of(root)
+    if document is None:
+        return None, url
+    beside = document.with_name(url.replace("\\", "/").rpartition("/")[2] or "none")
+    for place in (*places_of(url, document), beside):
+        if place.is_file():
+            with contextlib.suppress(SignfaceError):  # something else has that name
+                found = named(parse_xml(place).getroot(), "CONTROLLED_VOCABULARY", element.get("CV_ID"))
+                if found is not None:
+                    return found, url
+    return None, url
 
 
 def _language(root: etree._Element, tier: str | None) -> str | None:
@@ -168,24 +200,33 @@ def vocabulary_entries(element: etree._Element, language: str | None) -> Iterato
 def _from_element(element: etree._Element, language: str | None, file: Path) -> Vocabulary:
     name = element.get("CV_ID") or file.stem
     if element.get("EXT_REF"):
-        raise SignfaceError(f"the vocabulary {name} is kept in another file", file=file, hint="read its .ecv")
+        found, where = external_vocabulary(element.getroottree().getroot(), element)
+        if found is None:
+            words = f"the vocabulary {name} is kept in {where or 'another file'}, which is not here"
+            raise SignfaceError(words, file=file, hint="put the .ecv beside it, or read that")
+        element = found
     colours = _colours(file.with_suffix(".pfsx"), name)
     rows = {value.strip(): rest for value, *rest in vocabulary_entries(element, language) if value.strip()}
     if not rows:
         raise SignfaceError(f"the vocabulary {name} has no value", file=file)
     described = element.find("DESCRIPTION")
     description = (described.text or "") if described is not None else element.get("DESCRIPTION") or ""
-    entries = [Entry(value, words, colours.get(key)) for value, (words, key) in rows.items()]
+    entries = [Entry(value, words, colours.get(key or value)) for value, (words, key) in rows.items()]
     return Vocabulary.of(entries, name, description)
 
 
 def _colours(preferences: Path, name: str) -> dict[str, Colour]:
-    """Colour of each entry of a vocabulary in the preferences beside an EAF; none where they cannot be read."""
+    """Colour of each entry of a vocabulary in the preferences beside an EAF; none where they cannot be read.
+
+    Entries are known by their identifier, and before EAF 2.8 by their value.
+    """
     try:
         root = parse_xml(preferences).getroot()
     except SignfaceError:  # an annotator's preferences are not what was asked for
         return {}
-    groups: Iterable[etree._Element] = root.iterfind("prefGroup[@key='CV.ML.Prefs']/prefGroup")
+    groups: Iterable[etree._Element] = (
+        group for key in ("CV.Prefs", "CV.ML.Prefs") for group in root.iterfind(f"prefGroup[@key='{key}']/prefGroup")
+    )
     colours: dict[str, Colour] = {}
     for group in groups:
         for entry in group.iterfind("prefGroup") if group.get("key") == name else ():

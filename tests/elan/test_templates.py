@@ -13,8 +13,9 @@ from signface.elan.document import read_document, tier_rows
 from signface.elan.mapping import ChannelRule, read_mapping
 from signface.elan.mapping_draft import suggest_mapping
 from signface.elan.tiers import Tier
+from signface.elan.vocabularies import read_vocabulary
 from signface.elan.writing import prepare, write_eaf
-from signface.errors import SignfaceError
+from signface.errors import SignfaceError, SignfaceWarning
 from signface.label.vocabulary import AFFECT
 from signface.settings.eaf import EafOptions
 from signface.signer import Signer
@@ -457,3 +458,43 @@ def test_a_tier_of_ours_stays_ours_after_others_have_written_the_file(tmp_path):
         path.write_text(text.replace(gone, "", 1) if gone[0] == " " else text.replace(gone, "other"), "utf-8")
         write_eaf(labelled("N NA A"), into=path, replace=True)
         assert [row[2] for row in read_back(path, "affect")] == ["N", "NA", "A"]
+
+
+SHARED = """<CV_RESOURCE VERSION="0.2"><LANGUAGE LANG_ID="deu" LANG_LABEL="German"/>
+<CONTROLLED_VOCABULARY CV_ID="Emotionen"><DESCRIPTION LANG_REF="deu">shared</DESCRIPTION>
+<CV_ENTRY_ML CVE_ID="x0"><CVE_VALUE LANG_REF="deu">neutral</CVE_VALUE></CV_ENTRY_ML>
+<CV_ENTRY_ML CVE_ID="x1"><CVE_VALUE LANG_REF="deu">Freude</CVE_VALUE></CV_ENTRY_ML>
+</CONTROLLED_VOCABULARY></CV_RESOURCE>
+"""
+
+
+def with_external_vocabulary(url: str) -> str:
+    import re
+
+    kept = '<CONTROLLED_VOCABULARY CV_ID="Emotionen" EXT_REF="er2"/>'
+    text = re.sub("<CONTROLLED_VOCABULARY.*</CONTROLLED_VOCABULARY>", kept, LAB, flags=re.DOTALL)
+    return text.replace("</ANNOTATION_D", f'<EXTERNAL_REF EXT_REF_ID="er2" TYPE="ecv" VALUE="{url}"/></ANNOTATION_D')
+
+
+@pytest.mark.parametrize("url", ["file:///C:/lab/our values.ecv", "file:HERE/our%20values.ecv", "./our values.ecv",
+                                 "https://example.org/our values.ecv"])  # fmt: skip
+def test_values_of_a_vocabulary_in_another_file_are_checked_and_referred_to(tmp_path, mapping, url):
+    path = tmp_path / "lab.eaf"
+    path.write_text(with_external_vocabulary(url.replace("HERE", str(tmp_path))), "utf-8")
+    (tmp_path / "our values.ecv").write_text(SHARED, "utf-8")
+    write_eaf(labelled(), into=path, signer="S1", options=mapping)
+    annotations = read_document(path).getroot().findall("TIER[@TIER_ID='Emotion_S1']/ANNOTATION/*")
+    assert [one.get("CVE_REF") for one in annotations] == ["x0", "x1", "x0"]
+    assert read_vocabulary(path, tier="Emotion_S1").values == ("neutral", "Freude")
+    (tmp_path / "our values.ecv").write_text(SHARED.replace("Freude", "Glück"), "utf-8")
+    with pytest.raises(SignfaceError, match=r"'Freude' \(affect\) is not in the closed vocabulary.*neutral, Glück"):
+        write_eaf(labelled("N NJ J"), into=path, signer="S1", options=mapping)
+
+
+def test_values_that_cannot_be_checked_are_said(tmp_path, mapping):
+    path = tmp_path / "lab.eaf"
+    path.write_text(with_external_vocabulary("https://example.org/values.ecv"), "utf-8")
+    with pytest.warns(SignfaceWarning, match=r"Emotion_S1 is kept in https://example.org/values.ecv.*not checked"):
+        write_eaf(labelled(), into=path, signer="S1", options=mapping)
+    with pytest.raises(SignfaceError, match=r"kept in https://example.org/values.ecv, which is not here"):
+        read_vocabulary(path, tier="Emotion_S1")
