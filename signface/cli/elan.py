@@ -23,6 +23,7 @@ EXAMPLE = """  signface elan check corrected/*.eaf
   signface elan map annotated/*.eaf -o mapping.toml
   signface elan learn corpora/mine -o mine.skops
   signface elan agree eva.eaf tom.eaf -o agreement/
+  signface elan table annotated/*.eaf -o annotations.csv
   signface elan install-recogniser --elan /opt/ELAN_7-0"""
 
 
@@ -96,6 +97,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     agree.add_argument("--gamma", action="store_true", help="compute gamma too (slow)")
     agree.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="also write tables (.csv) and pictures")
 
+    table = action(
+        "table",
+        "write every annotation as a row of one table, with its parents' values",
+        "signface elan table annotated/*.eaf -o annotations.csv",
+    )
+    table.add_argument("files", nargs="+", type=Path, metavar="EAF", help="or folders of them")
+    table.add_argument(
+        "--tier", action="append", default=[], metavar="NAME",
+        help="only this tier, or those with this name before @; may be repeated (default: all)",
+    )  # fmt: skip
+    table.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="a .csv or .parquet file")
+
     install = action(
         "install-recogniser",
         "write the recogniser that ELAN itself runs",
@@ -117,6 +130,7 @@ def run(arguments: argparse.Namespace) -> int | None:
         "map": map_template,
         "learn": learn_corrections,
         "agree": compare_annotators,
+        "table": write_annotations,
         "install-recogniser": install_recogniser,
         "recognise": recognise,
     }
@@ -225,6 +239,26 @@ def compare_annotators(arguments: argparse.Namespace) -> None:
 
         write_agreement(agreements, arguments.output)
         print(f"{arguments.output}: tables and pictures")
+
+
+def write_annotations(arguments: argparse.Namespace) -> None:
+    """Write one table of all annotations, and say how many there are."""
+    from signface.elan.table import annotation_table, check_table_file, write_table
+
+    check_table_file(arguments.output)
+    files: list[Path] = []
+    for name in arguments.files:
+        found = sorted(name.glob("*.eaf")) if name.is_dir() else [name]
+        if not found:
+            raise SignfaceError("holds no .eaf", file=name)
+        files += found
+    if arguments.output.suffix.lower() not in (".csv", ".parquet"):
+        raise SignfaceError(
+            "is no table that can be written", file=arguments.output, hint="name a .csv or .parquet file"
+        )
+    table = annotation_table(files, tiers=arguments.tier)
+    write_table(table, arguments.output)
+    print(f"{arguments.output}: {len(table)} annotations on {table['tier'].nunique()} tiers of {len(files)} files")
 
 
 def install_recogniser(arguments: argparse.Namespace) -> None:
