@@ -37,10 +37,14 @@ from signface.elan.elements import (
     vocabulary_element,
 )
 from signface.elan.mapping import ChannelRule, Mapping, closed_entries, stereotype
+from signface.elan.nesting import nested
 from signface.elan.tiers import Tier, clean_name, tier_name
 from signface.elan.upgrade import insert_in_order
 from signface.errors import SignfaceError
 from signface.label.vocabulary import AFFECT, Vocabulary
+
+#: Stereotypes of tiers whose annotations have time slots.
+WITH_TIMES = (None, "Time_Subdivision", "Included_In")
 
 #: Ending of the names of our types and vocabularies where the lab has others of that name.
 OURS = " (signface)"
@@ -93,7 +97,8 @@ def put_tiers(
     """
     before = tier_rows(root)
     written = recorded(root)
-    groups = [(tier, targets) for tier in tiers if (targets := _plan(root, tier, mapping or {}, file))]
+    tiers, mapping = nested(root, tiers, mapping or {}, file)
+    groups = [(tier, targets) for tier in tiers if (targets := _plan(root, tier, mapping, file))]
     names = [target.tier_id for _, group in groups for target in group]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
@@ -111,7 +116,7 @@ def put_tiers(
                     file=file,
                     hint="keep them and leave the tier out of the mapping, or overwrite them with --replace",
                 )
-        _refuse_losses(root, group, file)
+        _refuse_losses(root, group, set(names), file)
         changed.append((tier, group))
     if not changed:
         return False
@@ -176,26 +181,25 @@ def _target(
         )
     aligned = parent is None
     if element is not None:
-        kind = stereotype(root, element)
-        if parent is not None and kind is None:
-            aligned = True  # the lab keeps this channel on a tier of its own times
-        elif (
-            (kind is not None)
-            if parent is None
-            else (kind != "Symbolic_Association" or element.get("PARENT_REF") != parent.tier_id)
-        ):
+        kind, above = stereotype(root, element), element.get("PARENT_REF")
+        if parent is None:
+            fits = kind in (None, "Included_In")  # `nested` has seen to what must lie around them
+        else:
+            aligned = kind in WITH_TIMES  # the lab keeps this channel on a tier of its own times
+            fits = kind is None or above == parent.tier_id
+        if not fits:
             raise SignfaceError(
-                f"the tier {tier_id} depends on {element.get('PARENT_REF')} ({kind}), which {channel} cannot",
+                f"the tier {tier_id} depends on {above} ({kind}), which {channel} cannot",
                 file=file,
                 hint="map it to a tier without a parent"
-                + ("" if parent is None else f", or one associated with {parent.tier_id}"),
+                + (", or one included in another" if parent is None else f", or one that depends on {parent.tier_id}"),
             )
     values = [None if label is None else rule.value(label, tier.vocabulary or AFFECT) for label in labels]
     if parent is not None:  # an annotation that is left out takes what hangs on it along
         values = [None if above is None else value for above, value in zip(parent.values, values)]
     entries = None if element is None else closed_entries(root, element)
     if entries is not None:
-        outside = sorted({value for value in values if value is not None and value not in entries})
+        outside = sorted({value for value in values if value and value not in entries})
         if outside:
             raise SignfaceError(
                 f"{outside[0]!r} ({channel}) is not in the closed vocabulary of the tier {tier_id}",
@@ -238,13 +242,16 @@ def _meaning(labels: Sequence[str | None], values: Sequence[str | None]) -> dict
     return {value: next(iter(ours)) for value, ours in stands_for.items() if len(ours) == 1 and ours != {value}}
 
 
-def _refuse_losses(root: etree._Element, group: list[_Target], file: Path) -> None:
-    """Refuse when annotations of others hang on, or link to, those that would be rewritten."""
+def _refuse_losses(root: etree._Element, group: list[_Target], written: set[str], file: Path) -> None:
+    """Refuse when annotations of others hang on, or link to, those that would be rewritten.
+
+    What is `written` in the same run is not lost.
+    """
     names = {target.tier_id for target in group}
     for child in root.iterfind("TIER"):
         if (
             child.get("PARENT_REF") in names
-            and child.get("TIER_ID") not in names
+            and child.get("TIER_ID") not in written
             and child.find("ANNOTATION") is not None
         ):
             raise SignfaceError(
