@@ -12,16 +12,21 @@ written `NaN`, because an empty cell at the end of a row would be read as 0.
 
 from __future__ import annotations
 
+import contextlib
 import datetime
+import warnings
 from dataclasses import dataclass
 from os import PathLike
+from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 import pandas as pd
 from lxml import etree
 
-from signface.elan.document import iso_date, link_urls, write_document
-from signface.errors import SignfaceError
+from signface.elan.document import iso_date, link_urls, parse_xml, write_document
+from signface.elan.links import CURVES_ENDING
+from signface.errors import SignfaceError, SignfaceWarning
 from signface.files import whole_file
 
 PROVIDER = "mpi.eudico.client.annotator.timeseries.csv.CSVServiceProvider"
@@ -109,6 +114,9 @@ def write_tsconf(
 ) -> None:
     """Write the description of a curves file for ELAN's timeseries viewer.
 
+    ELAN itself gives the tracks that an annotator adds to the description of this name: those of other files stay, and
+    so do the colours she gave to ours.
+
     The `source-url` is the absolute URL that the EAF's LINKED_FILE_DESCRIPTOR holds: when both move to another
     folder, ELAN finds the csv by its relative URL and maps the old absolute one to the new.
 
@@ -125,10 +133,29 @@ def write_tsconf(
     ------
     SignfaceError
         The curves cannot be read, or the folder cannot be written.
+
+    Warns
+    -----
+    SignfaceWarning
+        The file is there and no description of curves: it is left as it is.
     """
     table = _read_curves(curves)
-    root = etree.Element("timeseries", date=iso_date(date), version="1.0")
-    source = etree.SubElement(root, "tracksource")
+    root = _described(Path(path))
+    if root is None:
+        warnings.warn(
+            f"{path}: is no description of curves, and is left as it is: ELAN will not show ours; move it away",
+            SignfaceWarning,
+            stacklevel=2,
+        )
+        return
+    root.set("date", iso_date(date))
+    source = etree.Element("tracksource")
+    # Those of another name are of the file that this one is a copy of
+    same = [one for one in root.iterfind("tracksource") if _file_name(one).endswith(CURVES_ENDING)]
+    chosen = {track.get("name"): track.findtext("color") for one in same for track in one.iterfind("track")}
+    for old in same:
+        root.remove(old)
+    root.insert(0, source)
     source.set("source-url", link_urls(curves, path)[0])
     source.set("sample-type", "Continuous Rate")
     source.set("time-column", "0")
@@ -143,8 +170,24 @@ def write_tsconf(
         etree.SubElement(track, "description").text = curve.description
         etree.SubElement(track, "units").text = curve.units
         etree.SubElement(track, "range", min=f"{low:g}", max=f"{high:g}")
-        etree.SubElement(track, "color").text = ",".join(map(str, curve.colour))
+        etree.SubElement(track, "color").text = chosen.get(curve.name) or ",".join(map(str, curve.colour))
     write_document(etree.ElementTree(root), path)
+
+
+def _described(file: Path) -> etree._Element | None:
+    """The description that is there, or an empty one; None where the file is something else."""
+    if not file.exists():
+        return etree.Element("timeseries", version="1.0")
+    with contextlib.suppress(SignfaceError):
+        root = parse_xml(file).getroot()
+        if root.tag == "timeseries":
+            return root
+    return None
+
+
+def _file_name(source: etree._Element) -> str:
+    """Name of the file that a description's tracks come from."""
+    return unquote((source.get("source-url") or "").replace("\\", "/").rpartition("/")[2])
 
 
 def panels(curves: str | PathLike[str]) -> dict[int, list[str]]:

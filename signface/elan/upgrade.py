@@ -16,6 +16,7 @@ import re
 from lxml import etree
 
 from signface.elan.document import SCHEMA_URL, XSI, named
+from signface.elan.vocabularies import external_vocabulary
 
 #: The language of values that were written before languages were known, as ELAN names it.
 UNDETERMINED = {
@@ -63,7 +64,8 @@ def upgrade(root: etree._Element) -> None:
     entries = {}
     for vocabulary in root.iterfind("CONTROLLED_VOCABULARY"):
         if _upgrade_vocabulary(root, vocabulary) or every:
-            entries[vocabulary.get("CV_ID")] = _identifiers(vocabulary)
+            kept = external_vocabulary(root, vocabulary)[0] if vocabulary.get("EXT_REF") else vocabulary
+            entries[vocabulary.get("CV_ID")] = {} if kept is None else _identifiers(kept)
     _refer_to_entries(root, entries)
     root.set("VERSION", "3.0")
     root.set("FORMAT", "3.0")

@@ -142,7 +142,9 @@ class ModifiedKappa(Content):
     kappa : float
         The modified kappa; NaN where it is undefined. It can be negative (EasyDIAg shows 0 then).
     kappa_max : float
-        The highest kappa that the annotators' own shares of the labels allow.
+        The highest kappa that the annotators' own shares of the labels allow, over the chance that `kappa` itself is
+        corrected by, so that the two can be compared. ELAN takes for its maximum the chance of an ordinary kappa (the
+        product of the margins), and shows another number here.
     raw : float
         Agreement as a share, uncorrected.
     table : DataFrame

@@ -11,7 +11,7 @@ from signface.annotation import Annotation
 from signface.descriptors import Descriptors
 from signface.elan.curves import CURVES, panels, write_curves, write_tsconf
 from signface.elan.writing import write_eaf
-from signface.errors import SignfaceError
+from signface.errors import SignfaceError, SignfaceWarning
 from signface.segmentation.curves import curves_table
 from tests.fixtures.elan_files import assert_valid, labelled
 
@@ -131,3 +131,28 @@ def test_no_panel_holds_more_curves_than_can_be_read(tmp_path, bases):
     assert max(map(len, drawn.values())) <= 5
     names = [name for panel in drawn.values() for name in panel]
     assert len(set(names)) == len(names) == len(pd.read_csv(tmp_path / "take.curves.csv").columns) - 1
+
+
+def test_tracks_and_colours_of_others_stay_in_the_description(tmp_path):
+    """ELAN keeps the tracks that an annotator adds in a file of this very name."""
+    eaf, tsconf = tmp_path / "take.eaf", tmp_path / "take_tsconf.xml"
+    tsconf.write_text(
+        '<timeseries version="1.0"><tracksource source-url="file:///glove.csv"><track name="bend"/></tracksource>'
+        "</timeseries>"
+    )
+    write_eaf(Annotation(descriptors(), labelled(), "forest"), eaf, signer="S1")
+    text = tsconf.read_text("utf-8")
+    tsconf.write_text(text.replace("<color>0,158,115<", "<color>1,2,3<", 1), "utf-8")
+    write_eaf(Annotation(descriptors(), labelled("N NA A AN N"), "forest"), eaf, signer="S1")
+    sources = etree.parse(tsconf).findall("tracksource")
+    assert [source.get("source-url").rpartition("/")[2] for source in sources] == ["take.curves.csv", "glove.csv"]
+    assert sources[0].find("track").get("name") == "velocity"
+    assert sources[0].findtext("track/color") == "1,2,3"
+
+
+@pytest.mark.parametrize("other", ["<other/>", "no XML"])
+def test_a_file_that_is_no_description_is_left_as_it_is(tmp_path, other):
+    (tmp_path / "take_tsconf.xml").write_text(other)
+    with pytest.warns(SignfaceWarning, match="is no description of curves"):
+        write_eaf(Annotation(descriptors(), labelled(), "forest"), tmp_path / "take.eaf", signer="S1")
+    assert (tmp_path / "take_tsconf.xml").read_text() == other

@@ -115,8 +115,11 @@ def test_a_renamed_copy_shows_curves_of_its_own(tmp_path, labels):
     write_eaf(take(), tmp_path / "take.eaf", signer="S1")
     copy = tmp_path / "copy.eaf"
     shutil.copy(tmp_path / "take.eaf", copy)
+    shutil.copy(tmp_path / "take_tsconf.xml", tmp_path / "copy_tsconf.xml")  # as ELAN does on saving as
     write_eaf(take(labels), into=copy, signer="S1")
     assert links(copy) == ["./copy.curves.csv", "./copy_tsconf.xml"]
+    sources = etree.parse(tmp_path / "copy_tsconf.xml").findall("tracksource")
+    assert [source.get("source-url").rpartition("/")[2] for source in sources] == ["copy.curves.csv"]
     assert (tmp_path / "take_tsconf.xml").is_file()
     assert links(tmp_path / "take.eaf") == ["./take.curves.csv", "./take_tsconf.xml"]
 

@@ -78,6 +78,22 @@ def test_annotations_of_old_files_stay_tied_to_their_vocabulary(tmp_path, versio
     assert references["a2"] is None
 
 
+def test_annotations_of_old_files_stay_tied_to_a_vocabulary_in_another_file(tmp_path):
+    file = tmp_path / "old.eaf"
+    kept = OLD.index("  <CONTROLLED_VOCABULARY")
+    file.write_text(
+        OLD[:kept] + '<CONTROLLED_VOCABULARY CV_ID="NMM" EXT_REF="er1"/>'
+        '<EXTERNAL_REF EXT_REF_ID="er1" TYPE="ecv" VALUE="file:///gone/lab.ecv"/></ANNOTATION_DOCUMENT>'
+    )
+    entry = '<CV_ENTRY_ML CVE_ID="x7"><CVE_VALUE LANG_REF="und">wh</CVE_VALUE></CV_ENTRY_ML>'
+    (tmp_path / "lab.ecv").write_text(
+        f'<CV_RESOURCE><CONTROLLED_VOCABULARY CV_ID="NMM">{entry}</CONTROLLED_VOCABULARY></CV_RESOURCE>'
+    )
+    write_eaf(labelled(), into=file, signer="S1")
+    references = {one.get("ANNOTATION_ID"): one.get("CVE_REF") for one in etree.parse(file).xpath("//ANNOTATION/*")}
+    assert (references["a1"], references["a2"]) == ("x7", None)
+
+
 def test_references_that_a_newer_file_lacks_are_its_own_affair(tmp_path):
     file = tmp_path / "old.eaf"
     file.write_text(OLD)

@@ -12,7 +12,7 @@ from signface.elan.channels import channel_tiers
 from signface.elan.mapping import ChannelRule
 from signface.elan.reference import read_reference
 from signface.elan.writing import write_eaf
-from signface.errors import SignfaceError
+from signface.errors import SignfaceError, SignfaceWarning
 from signface.segmentation.segments import Segments
 from signface.settings.eaf import EafOptions
 from signface.signer import Signer
@@ -88,7 +88,8 @@ def test_into_a_file_that_has_curves_of_its_own(tmp_path):
     lab = tmp_path / "lab.eaf"
     own = '<LINKED_FILE_DESCRIPTOR LINK_URL="file:///films/theirs_tsconf.xml" MIME_TYPE="text/xml"/>\n    <PROPERTY'
     lab.write_text(LAB.replace("<PROPERTY", own, 1), "utf-8")
-    written = write_eaf(Annotation(nodding(), labelled(), "forest"), into=lab, signer="S1")
+    with pytest.warns(SignfaceWarning, match="links theirs_tsconf.xml"):
+        written = write_eaf(Annotation(nodding(), labelled(), "forest"), into=lab, signer="S1")
     assert [file.name for file in written] == ["lab.eaf", "lab.curves.csv"]
     assert_valid(lab)
     links = [link.get("LINK_URL") for link in etree.parse(lab).getroot().iterfind("HEADER/LINKED_FILE_DESCRIPTOR")]
