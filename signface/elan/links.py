@@ -53,7 +53,12 @@ def link_media(header: etree._Element, video: str | PathLike[str], file: Path) -
         header.insert(len(header.findall("MEDIA_DESCRIPTOR")), element)
     elif _leads(element, MEDIA, video, file):
         return False
+    before = element.get("MEDIA_URL")
     _set(element, MEDIA, *link_urls(video, file))
+    for other in header if before else ():  # sound or curves that were taken from this film name it by its URL
+        for attribute in ("EXTRACTED_FROM", "ASSOCIATED_WITH"):
+            if other.get(attribute) == before:
+                other.set(attribute, element.get("MEDIA_URL"))
     if made:
         element.set("MIME_TYPE", mimetypes.guess_type(str(video))[0] or "video/mp4")
     return True

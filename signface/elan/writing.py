@@ -153,6 +153,12 @@ def write_eaf(
         exists and someone has worked in it, or is broken (`checking.check_document`); annotations of others would be
         lost; the take ends before time 0; the folder cannot be written. Files are then as they were.
 
+    Warns
+    -----
+    SignfaceWarning
+        ELAN will not show the curves, or not for ever; preferences, or a vocabulary in another file, cannot be read;
+        annotations end at the edges of those of a lab's parent tier.
+
     See Also
     --------
     signface.annotation.annotate : finds what is written.

@@ -56,6 +56,17 @@ def test_a_film_that_the_file_links_is_not_linked_again(tmp_path, urls):
     assert_valid(file)
 
 
+def test_what_was_taken_from_a_film_follows_it(tmp_path):
+    (tmp_path / "film.mp4").write_bytes(b"film")
+    file = tmp_path / "lab.eaf"
+    film = '<MEDIA_DESCRIPTOR MEDIA_URL="file:///D:/film.mp4" MIME_TYPE="video/mp4"/>'
+    sound = film.replace("film.mp4", "a.wav").replace("/>", ' EXTRACTED_FROM="file:///D:/film.mp4"/>')
+    file.write_text(LAB.replace(OF_THE_LAB, film + sound), "utf-8")
+    write_eaf(labelled(), into=file, signer="S1", video=tmp_path / "film.mp4")
+    assert media(file)[1]["EXTRACTED_FROM"] == media(file)[0]["MEDIA_URL"] == f"file://{tmp_path}/film.mp4"
+    assert media(file)[1]["MEDIA_URL"] == "file:///D:/a.wav"
+
+
 def test_another_film_is_linked_beside_the_labs(tmp_path):
     for name in ("cam1", "cam2"):
         (tmp_path / name).mkdir()
