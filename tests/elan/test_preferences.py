@@ -6,6 +6,7 @@ import pytest
 from lxml import etree
 
 from signface.annotation import Annotation
+from signface.elan.vocabularies import read_vocabulary
 from signface.elan.writing import write_eaf
 from signface.errors import SignfaceWarning
 from signface.settings.eaf import EafOptions
@@ -181,3 +182,9 @@ def test_preferences_that_cannot_be_read_stay_as_they_are(tmp_path, broken):
     with pytest.warns(SignfaceWarning, match="take.pfsx.*not written"):
         write_eaf(labelled(), tmp_path / "take.eaf", signer="S1")
     assert (tmp_path / "take.pfsx").read_text() == broken
+
+
+def test_colours_of_an_old_file_are_those_of_its_vocabulary(tmp_path):
+    (tmp_path / "old.eaf").write_text(OLD)
+    (tmp_path / "old.pfsx").write_text(OLD_COLOURS)
+    assert read_vocabulary(tmp_path / "old.eaf").colours == {"neg": (255, 0, 0)}
