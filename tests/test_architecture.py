@@ -24,6 +24,8 @@ FLOORS = [
     "frames",
     "content",
     "columns",
+    "marker_names",
+    "timecode",
     "settings",
     "descriptors",
     "head",

@@ -111,7 +111,7 @@ def run(arguments: argparse.Namespace) -> int:
             path, into = (file, None) if arguments.into is None else (None, file)
             try:
                 descriptors = known.get(take) or solve(
-                    open_recording(take, read_as=settings.read_as), face, layout, settings=settings, signer=signer
+                    open_recording(take, **settings.reading), face, layout, settings=settings, signer=signer
                 )
                 clauses = [one.found(take) for one in further]
                 result = annotate(descriptors, model.result(), signer=signer, channels=channels, clauses=clauses)
@@ -176,7 +176,7 @@ def _of_all(
     from signface.solver.signer_rest import learn_signer
     from signface.takes.reading import open_recording
 
-    openers = [partial(open_recording, take, read_as=settings.read_as) for take in takes]
+    openers = [partial(open_recording, take, **settings.reading) for take in takes]
     try:
         first = openers[0]()
         of_landmarks = not isinstance(first, Descriptors) and choose_layout(first.labels, read_face()).of_landmarks
@@ -207,7 +207,7 @@ class _Further:
         from signface.annotation import find_clause
         from signface.takes.reading import open_recording
 
-        recording = self.known.get(take) or open_recording(take, read_as=self.settings.read_as)
+        recording = self.known.get(take) or open_recording(take, **self.settings.reading)
         return find_clause(recording, self.model, signer=self.signer)
 
 

@@ -46,13 +46,14 @@ def run(arguments: argparse.Namespace) -> int:
     from signface.solver.range_of_motion import away_from_avatar, calibrate_guarded
     from signface.solver.solving import face_and_layout
     from signface.takes.reading import open_recording
+    from signface.takes.selecting import selected
 
     if arguments.output.suffix.lower() not in (".csv", ".json"):
         raise SignfaceError("a signer's bases are written as .csv, a signer as .json", file=arguments.output)
-    recording = open_recording(arguments.take)
+    settings = settings_from(arguments, SolveSettings)
+    recording = selected(open_recording(arguments.take, **settings.reading), settings)
     if isinstance(recording, Descriptors):
         raise SignfaceError("holds weights, not markers", file=arguments.take)
-    settings = settings_from(arguments, SolveSettings)
     face, layout = face_and_layout(recording.labels, settings)
     found = calibrate_guarded(
         recording,

@@ -316,7 +316,7 @@ def _recognise(xml: bytes) -> None:
     name = chosen.get("signer", "")
     signer = Signer.read(chosen["signer_file"], name=name or None) if "signer_file" in chosen else Signer(name)
     print(progress_line(0.05, "reading"), flush=True)
-    recording = read_recording(Path(chosen["take"]), read_as=settings.read_as)
+    recording = read_recording(Path(chosen["take"]), **settings.reading)
     model = load_model(chosen.get("classifier", "default"), quickly=True)
     print(progress_line(0.2, "solving"), flush=True)
     annotation = annotate(recording, model, settings=settings, signer=signer)

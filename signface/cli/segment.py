@@ -32,7 +32,7 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.output.suffix.lower() != ".csv":
         raise SignfaceError("segments are written as .csv", file=arguments.output)
     settings, signer = settings_from(arguments, SolveSettings), signer_from(arguments)
-    descriptors = solve(open_recording(arguments.recording, read_as=settings.read_as), settings=settings, signer=signer)
+    descriptors = solve(open_recording(arguments.recording, **settings.reading), settings=settings, signer=signer)
     segments = segment(descriptors)
     write_segments(segments, arguments.output)
     stable = int((segments.table["kind"] == "stable").sum())

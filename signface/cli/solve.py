@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
                     else None
                 )
                 for piece in solve_pieces(
-                    open_recording(take, read_as=settings.read_as),
+                    open_recording(take, **settings.reading),
                     face,
                     layout,
                     settings=settings,

@@ -22,6 +22,7 @@ from signface.errors import SignfaceError
 from signface.files import shipped
 from signface.settings.solve import SolveSettings
 from signface.signer import Signer
+from signface.takes.selecting import selected
 
 if TYPE_CHECKING:
     from signface.face.layout import MarkerLayout
@@ -44,7 +45,7 @@ def describe_entry(entry: TakeEntry, recipe: Recipe, signer: Signer | None = Non
 
     recording = read_entry(entry, recipe)
     if isinstance(recording, Descriptors):
-        return recording
+        return selected(recording, recipe.settings)
     settings = SolveSettings() if recipe.settings is None else recipe.settings
     if entry.neutral_s is not None:
         settings = settings.changed(neutral=entry.neutral_s)
@@ -60,7 +61,7 @@ def read_entry(entry: TakeEntry, recipe: Recipe | None = None) -> Take | Descrip
     from signface.takes.reading import read_recording
 
     settings = None if recipe is None else recipe.settings
-    recording = read_recording(entry.path, read_as=None if settings is None else settings.read_as)
+    recording = read_recording(entry.path, **(SolveSettings() if settings is None else settings).reading)
     if entry.start_s is None:
         return recording
     return recording.changed(f"start at {entry.start_s:g} s", start=entry.start_s)

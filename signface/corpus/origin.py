@@ -29,7 +29,15 @@ from signface.settings.solve import SolveSettings
 #: The modules between a recording and its descriptors.
 SOLVING_CODE = (
     *("takes", "face", "solver", "corpus/describing.py", "descriptors.py", "descriptors_files.py"),
-    *("columns.py", "frames.py", "settings/base.py", "settings/solve.py", "signer.py"),
+    *(
+        "marker_names.py",
+        "timecode.py",
+        "columns.py",
+        "frames.py",
+        "settings/base.py",
+        "settings/solve.py",
+        "signer.py",
+    ),
 )
 
 
@@ -132,9 +140,10 @@ def make_recipe(settings: SolveSettings | None = None) -> Recipe:
     return Recipe(settings, face_digest, layout_digest, code_digest(*SOLVING_CODE))
 
 
-def weights_recipe(read_as: str | None = None) -> Recipe:
-    """The recipe of recordings that hold weights already, or that are read as weights."""
-    return Recipe(None if read_as is None else SolveSettings(read_as=read_as), "", "", code_digest(*SOLVING_CODE))
+def weights_recipe(settings: SolveSettings | None = None) -> Recipe:
+    """The recipe of recordings that hold weights already, or that are read as weights: how they are read and cut."""
+    read = None if settings is None else SolveSettings(read_as=settings.read_as).for_take_of(settings)
+    return Recipe(None if read == SolveSettings() else read, "", "", code_digest(*SOLVING_CODE))
 
 
 def find_origin(entry: TakeEntry, folder: Path, recipe: Recipe) -> Origin:
@@ -167,7 +176,7 @@ def find_origin(entry: TakeEntry, folder: Path, recipe: Recipe) -> Origin:
         recording=content_digest(entry.path),
         neutral_s=None if holds_weights else entry.neutral_s,
         start_s=entry.start_s,
-        recipe=weights_recipe(read_as) if holds_weights else recipe,
+        recipe=weights_recipe(recipe.settings) if holds_weights else recipe,
         bases="" if holds_weights else find_signer(folder, entry.signer).solving_digest,
     )
 

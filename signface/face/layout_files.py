@@ -22,6 +22,7 @@ from signface.face.mesh import Mesh
 from signface.face.model import FaceModel
 from signface.face.reading import MILLIMETRES
 from signface.files import shipped, whole_file
+from signface.marker_names import by_subject
 
 #: A point of a layout may lie this far from the skin, in millimetres; farther, the layout is for another face.
 FARTHEST_MM = 10.0
@@ -175,11 +176,11 @@ def choose_layout(take_labels: Sequence[str], face: FaceModel) -> MarkerLayout:
     >>> sf.choose_layout(sf.datasets.mini_take().labels, sf.read_face()).name
     'default-40'
     """
-    bare = {label.rsplit(":", 1)[-1].strip().casefold() for label in take_labels}
     best, fit = None, 0
     for name, file in shipped("layouts", ".csv").items():
         table = _columns(file)
-        matched = sum(label.casefold() in bare for label in table["marker"][table["role"] == "face"])
+        faces = [label for label in table["marker"][table["role"] == "face"]]
+        matched = max(map(len, by_subject(take_labels, faces).values()), default=0)
         if matched > fit:
             best, fit = name, matched
     if best is None or fit < FEWEST:

@@ -5,12 +5,14 @@ It stands at the top of the package because descriptors and models carry it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from signface.errors import SignfaceError
 from signface.settings.base import Settings, number, option
+from signface.timecode import seconds_of_clock, seconds_of_timecode
 
 #: name: what it is, for `--help` and reports.
 METHODS = {
@@ -24,6 +26,9 @@ METHODS = {
     "sparse-online-gp": "its sparse online form",
     "measures": "brows, lids and mouth measured from rest (mm), and one weight of the brows",
 }
+
+#: What is said of a take and not of how takes are solved.
+OF_THE_TAKE = ("subject", "cut_from", "cut_to", "offset_s", "film_timecode")
 
 
 @dataclass(frozen=True)
@@ -105,9 +110,36 @@ class SolveSettings(Settings):
         flag="--as",
         metavar="aus",
     )
+    subject: str | None = option(
+        None, help="whose markers, of several signers in one recording (signface take info names them)", metavar="NAME"
+    )
+    cut_from: str | None = option(
+        None, help="only from this time on: seconds or [H:]M:S, as in the EAF", flag="--from", metavar="TIME"
+    )
+    cut_to: str | None = option(None, help="only up to this time, without it", flag="--to", metavar="TIME")
+    offset_s: float | None = number(
+        help="seconds added to the take's times: how long after its film it began", flag="--offset", metavar="SECONDS"
+    )
+    film_timecode: str | None = option(
+        None,
+        help="timecode of the film's first frame (H:M:S.s or H:M:S:F@RATE): a phone's take is placed by its own",
+        flag="--timecode",
+        metavar="TIMECODE",
+    )
 
     def __post_init__(self) -> None:
+        for name in ("cut_from", "cut_to"):
+            value = getattr(self, name)
+            if isinstance(value, (int, float)) and not isinstance(value, bool):
+                object.__setattr__(self, name, f"{value:.15g}")
         super().__post_init__()
+        begin, end = self.cut_s
+        if not begin < end:
+            raise SignfaceError(f"nothing lies from {self.cut_from} to {self.cut_to}", hint="--from is before --to")
+        if self.offset_s is not None and not abs(self.offset_s) < float("inf"):
+            raise SignfaceError(f"offset_s is no number of seconds: {self.offset_s}")
+        if self.film_timecode is not None:
+            seconds_of_timecode(self.film_timecode)
         if self.neutral != "auto":
             try:
                 object.__setattr__(self, "neutral", float(self.neutral))
@@ -117,6 +149,22 @@ class SolveSettings(Settings):
             value = getattr(self, name)
             if value is not None and not 0 <= value < float("inf"):
                 raise SignfaceError(f"{name} must be 0 or more, not {value:g}")
+
+    @property
+    def reading(self) -> dict[str, Any]:
+        """How a recording is opened: keywords of `signface.open_recording`."""
+        return {name: getattr(self, name) for name in ("read_as", "subject", "film_timecode")}
+
+    @property
+    def cut_s(self) -> tuple[float, float]:
+        """From when to when in seconds; infinite where the take is not cut."""
+        begin = -math.inf if self.cut_from is None else seconds_of_clock(self.cut_from)
+        return begin, math.inf if self.cut_to is None else seconds_of_clock(self.cut_to)
+
+    def for_take_of(self, other: SolveSettings | None) -> SolveSettings:
+        """The settings with whose markers, from when to when, and where in the film, as `other` says it of a take."""
+        other = type(self)() if other is None else other
+        return self.changed(**{name: getattr(other, name) for name in OF_THE_TAKE})
 
     @property
     def solver_options(self) -> dict[str, float]:
@@ -140,7 +188,7 @@ class SolveSettings(Settings):
         >>> sf.SolveSettings(alpha=0.3).differences(sf.SolveSettings().as_dict())
         ['alpha 0.3 instead of the usual']
         """
-        takes_own = ("face", "layout", "neutral")
+        takes_own = ("face", "layout", "neutral", *OF_THE_TAKE)
         words = {name: "the usual" if value is None else value for name, value in other.items()}
         return [
             f"{name} {'the usual' if value is None else value} instead of {words[name]}"

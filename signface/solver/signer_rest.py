@@ -21,6 +21,7 @@ from signface.signer_level import SignerRest
 from signface.solver.solving import face_and_layout, solve
 from signface.takes.recording import Recording
 from signface.takes.rigid import apply, inverse, rigid_transforms
+from signface.takes.selecting import selected
 
 #: Frames looked at over all takes.
 FRAMES = 6000
@@ -132,7 +133,7 @@ def learn_signer(
         landmarks, layout = [], None
         for opener in openers:
             with contextlib.suppress(SignfaceError):  # said when it is solved
-                recording = opener()
+                recording = selected(opener(), settings)
                 if isinstance(recording, Descriptors):
                     continue
                 _, found = face_and_layout(recording.labels, settings)

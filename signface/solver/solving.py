@@ -30,6 +30,7 @@ from signface.solver.thin_shell import ThinShellSolver
 from signface.solver.uncertainty import deviations
 from signface.takes.cleaning import Progress, silently
 from signface.takes.recording import PIECE, Recording, pieces
+from signface.takes.selecting import selected
 
 __all__ = ["PreparedTake", "prepare_take", "solve", "solve_pieces"]
 
@@ -138,6 +139,7 @@ def solve_pieces(
     >>> [part.n_frames for part in sf.solve_pieces(recording, piece=500)]
     [500, 500, 184]
     """
+    recording = selected(recording, settings)
     if isinstance(recording, Descriptors):
         yield recording
         return

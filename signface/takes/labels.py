@@ -1,8 +1,7 @@
 """Marker labels: making them clean and unique in a reader, and matching them with a layout's.
 
 - `clean_labels`: what a reader does: which points have a name, and unique names for them.
-- `stripped`: a label without its subject's prefix.
-- `match_labels`, `rename_to`: the markers of a layout found in a take.
+- `match_labels`, `rename_to`: the markers of a layout found in a take, all of one signer.
 - `Renaming`: the same as a stage, for any recording.
 """
 
@@ -13,6 +12,7 @@ import re
 from collections.abc import Sequence
 
 from signface.errors import SignfaceError
+from signface.marker_names import SMALLEST_MATCH, SeveralSigners, by_subject, folded, signers_among, stripped
 from signface.takes.recording import Recording
 from signface.takes.stages import Block, Stage, View, run
 from signface.takes.take import Take
@@ -20,19 +20,8 @@ from signface.takes.take import Take
 #: Names that tracking software gives to points nobody has labelled: `*12`, `U_3`, `Unlabeled 7`, or nothing at all.
 UNLABELLED = re.compile(r"^$|^\*\d*$|^U_?\d+$|^(un(labell?ed|named|identified))[\s_-]*\d*$", re.IGNORECASE)
 
-#: A take with fewer than this part of a layout's markers is not a take of that layout, unless the layout knows at least
-#: half of the take's markers (the 128 contour points of MediaPipe's 468).
-SMALLEST_MATCH, KNOWN_MARKERS = 1 / 3, 1 / 2
-
-
-def stripped(label: str) -> str:
-    """The label without the subject's prefix: `Anna:LBRO` and `Anna:head:LBRO` are `LBRO`."""
-    return label.rpartition(":")[2].strip()
-
-
-def _folded(label: str) -> str:
-    """The label as compared when case and separators differ: `L_Brow-1` and `lbrow 1` agree."""
-    return re.sub(r"[\s_.\-]+", "", stripped(label)).casefold()
+#: Or else the layout must know half of the take's markers (the 128 contour points of MediaPipe's 468).
+KNOWN_MARKERS = 1 / 2
 
 
 def clean_labels(labels: Sequence[str]) -> tuple[list[int], list[str], list[str]]:
@@ -69,11 +58,10 @@ def clean_labels(labels: Sequence[str]) -> tuple[list[int], list[str], list[str]
 
 
 def match_labels(take_labels: Sequence[str], labels: Sequence[str]) -> dict[str, str]:
-    """For each wanted label that the take has, the take's own name for it.
+    """For each wanted label that the take has, the take's own name for it; all of one subject.
 
-    An exact name wins; then the name without its subject's prefix, where the subject with the most matches is
-    taken (a take may hold two signers, or a signer and a prop); then the name without regard to case, spaces and
-    `_`, `-`, `.`.
+    An exact name wins over one without regard to case, spaces and `_`, `-`, `.`. Of several subjects (`by_subject`) the
+    one with the most matches is taken, never markers of two; names without a subject go with a single one.
 
     Returns
     -------
@@ -83,40 +71,30 @@ def match_labels(take_labels: Sequence[str], labels: Sequence[str]) -> dict[str,
     See Also
     --------
     rename_to : the take with these markers under the wanted names.
+    signers_among : whether there are several signers.
 
     Examples
     --------
-    >>> match_labels(["Anna:LBRO", "Anna:r_brow", "Ben:LBRO"], ["LBRO", "RBROW", "CHIN"])
+    >>> match_labels(["Anna:LBRO", "Anna:r_brow", "Ben:LBRO", "Ben:CHIN"], ["LBRO", "RBROW", "CHIN"])
     {'LBRO': 'Anna:LBRO', 'RBROW': 'Anna:r_brow'}
     """
-    exact = set(take_labels)
-    matches = {label: label for label in labels if label in exact}
-    by_subject: dict[str, dict[str, str]] = {}
-    for name in take_labels:
-        by_subject.setdefault(name.rpartition(":")[0], {})[stripped(name)] = name
-    wanted = set(labels) - set(matches)
-    by_subject = dict(sorted(by_subject.items(), key=lambda entry: -len(wanted & set(entry[1]))))  # stable: file order
-    used = set(matches.values())
-    for key in (stripped, _folded):
-        for names in by_subject.values():
-            keyed: dict[str, str] = {}
-            for name in names.values():
-                keyed.setdefault(key(name), name)
-            for label in labels:
-                name = keyed.get(key(label), "")
-                if label not in matches and name and name not in used:
-                    matches[label] = name
-                    used.add(name)
+    subjects = by_subject(take_labels, labels)
+    if not subjects:
+        return {}
+    most = max(subjects, key=lambda subject: len(subjects[subject]))  # the first of several
+    matches = dict(subjects[most])
+    if set(subjects) == {most, ""}:
+        matches = {**subjects[""], **matches}
     return {label: matches[label] for label in labels if label in matches}
 
 
 def close_names(missing: Sequence[str], spare: Sequence[str], most: int = 5) -> list[str]:
     """Pairs "LBRO1 (close: LBRW1)" for the first few missing labels, with the take's spare names that resemble them."""
-    folded = {_folded(name): name for name in spare}
+    alike = {folded(name): name for name in spare}
     pairs = []
     for label in missing[:most]:
-        close = difflib.get_close_matches(_folded(label), folded, n=2, cutoff=0.6)
-        pairs.append(f"{label} (close: {', '.join(folded[name] for name in close)})" if close else label)
+        close = difflib.get_close_matches(folded(label), alike, n=2, cutoff=0.6)
+        pairs.append(f"{label} (close: {', '.join(alike[name] for name in close)})" if close else label)
     if len(missing) > most:
         pairs.append(f"and {len(missing) - most} more")
     return pairs
@@ -179,6 +157,16 @@ class Renaming(Stage):
 
 def _find_labels(take: Recording, labels: list[str]) -> tuple[dict[str, str], str]:
     """For each of `labels` that a recording has, its name there, and a note for the history; raises as `rename_to`."""
+    signers = signers_among(take.labels, labels)
+    if len(signers) > 1:
+        raise SeveralSigners.named(signers, take.name)
+    twice = {label.rpartition("~")[0] for label in take.labels if re.search(r"~\d+$", label)}
+    if len(match_labels(sorted(twice), labels)) >= max(3, SMALLEST_MATCH * len(labels)):
+        raise SignfaceError(
+            f"has two markers each of the names {', '.join(sorted(twice)[:3])} ...: two signers without names",
+            file=take.name,
+            hint="give the subjects names where it was recorded (Anna:LBROI), or export one signer to a file",
+        )
     matches = match_labels(take.labels, labels)
     missing = [label for label in labels if label not in matches]
     spare = [label for label in take.labels if label not in set(matches.values())]
@@ -197,6 +185,15 @@ def _find_labels(take: Recording, labels: list[str]) -> tuple[dict[str, str], st
         notes.append(f"renamed: {', '.join(renamed[:5])}{' ...' * (len(renamed) > 5)}")
     if missing:
         notes.append(f"missing: {', '.join(close_names(missing, spare))}")
+    used = set(matches.values())
+    groups = by_subject(take.labels, labels)
+    others = [
+        f"{len(found)} of {subject or 'no subject'}"
+        for subject, found in groups.items()
+        if used.isdisjoint(found.values())
+    ]
+    if others:
+        notes.append(f"left out markers of other subjects: {', '.join(others[:5])}")
     if spare:
         notes.append(f"not in the layout: {', '.join(spare[:5])}{' ...' * (len(spare) > 5)}")
     return matches, "; ".join(notes)

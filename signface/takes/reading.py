@@ -14,9 +14,12 @@ from os import PathLike
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
+from signface.settings.solve import SolveSettings
 from signface.takes.formats.registry import format_of
 from signface.takes.recording import TakeFile
+from signface.takes.selecting import selected
 from signface.takes.take import Take
+from signface.timecode import seconds_apart, seconds_of_timecode
 
 
 def recognise(path: str | PathLike[str]) -> str:
@@ -41,7 +44,12 @@ def recognise(path: str | PathLike[str]) -> str:
 
 
 def open_recording(
-    path: str | PathLike[str], *, unit: str | None = None, read_as: str | None = None
+    path: str | PathLike[str],
+    *,
+    unit: str | None = None,
+    read_as: str | None = None,
+    subject: str | None = None,
+    film_timecode: str | None = None,
 ) -> Take | TakeFile | Descriptors:
     """Open a recording of any supported format; the content says which it is, not the ending.
 
@@ -55,6 +63,11 @@ def open_recording(
         Unit of length of the file ("mm", "m", ...), where it says none or a wrong one.
     read_as : str, optional
         `aus`: the action units of an OpenFace table that holds landmarks too.
+    subject : str, optional
+        Whose markers, or weights, where the file holds those of several people; `Anna` of markers `Anna:LBROI`.
+    film_timecode : str, optional
+        The timecode of the first frame of the film (`signface.timecode.seconds_of_timecode`): the recording starts
+        where its own timecode says. Only where the file has one.
 
     Returns
     -------
@@ -79,13 +92,33 @@ def open_recording(
     (1184, (100, 46, 3))
     """
     try:
-        return format_of(path, read_as).open(path, unit=unit)
+        kind = format_of(path, read_as)
+        recording = kind.open(path, unit=unit, **({"subject": subject} if kind.chooses_subject else {}))
+        if subject is not None and not kind.chooses_subject:
+            if isinstance(recording, Descriptors):
+                raise SignfaceError("holds weights of one person, who has no name", hint="leave out --subject")
+            recording = selected(recording, SolveSettings(subject=subject))
+        if film_timecode is None:
+            return recording
+        if kind.timecode is None:
+            raise SignfaceError(
+                f"{kind.title} files have no timecode", hint="say when the take began: --offset SECONDS"
+            )
+        start = seconds_apart(kind.timecode(path), seconds_of_timecode(film_timecode))
+        return recording.changed(
+            f"start at {start:.3f} s by its timecode, the film's being {film_timecode}", start=start
+        )
     except SignfaceError as error:
         raise error.at(path) from error
 
 
 def read_recording(
-    path: str | PathLike[str], *, unit: str | None = None, read_as: str | None = None
+    path: str | PathLike[str],
+    *,
+    unit: str | None = None,
+    read_as: str | None = None,
+    subject: str | None = None,
+    film_timecode: str | None = None,
 ) -> Take | Descriptors:
     """Read all of a recording into memory; parameters and errors are those of `open_recording`.
 
@@ -100,7 +133,7 @@ def read_recording(
     >>> type(recording).__name__, recording.duration
     ('Take', 5.92)
     """
-    recording = open_recording(path, unit=unit, read_as=read_as)
+    recording = open_recording(path, unit=unit, read_as=read_as, subject=subject, film_timecode=film_timecode)
     if not isinstance(recording, TakeFile):
         return recording
     try:
@@ -109,8 +142,8 @@ def read_recording(
         raise error.at(path) from error
 
 
-def read_take(path: str | PathLike[str], *, unit: str | None = None) -> Take:
-    """Read a recording that holds markers.
+def read_take(path: str | PathLike[str], *, unit: str | None = None, subject: str | None = None) -> Take:
+    """Read a recording that holds markers; of one `subject`, where it holds those of several.
 
     Raises
     ------
@@ -129,7 +162,7 @@ def read_take(path: str | PathLike[str], *, unit: str | None = None) -> Take:
     >>> take.n_frames, take.rate, take.labels[:3]
     (2149, 200.0, ('LBROI', 'RBROI', 'LBROM'))
     """
-    recording = read_recording(path, unit=unit)
+    recording = read_recording(path, unit=unit, subject=subject)
     if isinstance(recording, Descriptors):
         raise SignfaceError("holds weights, not markers", file=path, hint="give a recording of markers")
     return recording

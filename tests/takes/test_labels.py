@@ -6,7 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from signface.errors import SignfaceError
+from signface.marker_names import SeveralSigners, signers_among
+from signface.settings.solve import SolveSettings
 from signface.takes.labels import clean_labels, match_labels, rename_to
+from signface.takes.selecting import selected
 from signface.takes.take import Take
 
 
@@ -68,6 +71,49 @@ def test_a_take_with_a_small_part_of_a_large_layout_is_renamed():
     assert rename_to(take_of(contours), layout).labels == tuple(contours)
 
 
+PREFIXES = ["{}:{}", "{}_{}", "{}.{}", "{} {}", "{}-{}", "Session:{}:{}", "{}:face:{}"]
+
+
+@pytest.mark.parametrize("written", PREFIXES)
+def test_two_signers_in_one_file_are_never_mixed(written):
+    anna = [written.format("Anna", label) for label in LAYOUT if label != "CHIN"]
+    ben = [written.format("Ben", label) for label in LAYOUT if label != "NOSE"]
+    with pytest.raises(SeveralSigners, match=r"2 signers: Anna, Ben.*--subject Anna") as several:
+        rename_to(take_of(anna + ben), LAYOUT)
+    assert several.value.signers == ("Anna", "Ben")
+    for subject, own, lacks in (("Anna", anna, "CHIN"), ("Ben", ben, "NOSE")):
+        part = selected(take_of(anna + ben), SolveSettings(subject=subject))
+        assert part.labels == tuple(own)
+        assert rename_to(part, LAYOUT).labels == tuple(label for label in LAYOUT if label != lacks)
+
+
+def test_a_second_signer_of_few_markers_lends_none():
+    labels = [f"Anna:{label}" for label in LAYOUT if label != "CHIN"] + ["Ben:CHIN"]
+    renamed = rename_to(take_of(labels), LAYOUT)
+    assert "CHIN" not in renamed.labels
+    assert "left out markers of other subjects: 1 of Ben" in renamed.history[-1]
+
+
+def test_two_signers_without_names_are_refused():
+    kept, names, _ = clean_labels([*LAYOUT, *LAYOUT[:-1]])
+    assert len(kept) == 11
+    with pytest.raises(SignfaceError, match="two signers without names"):
+        rename_to(take_of(names), LAYOUT)
+
+
+def test_sides_and_numbers_before_a_separator_are_no_subjects():
+    labels = ["L_BROW", "R_BROW", "L_LIP", "R_LIP"]
+    assert match_labels(labels, ["LBROW", "RBROW", "LLIP", "RLIP"]) == dict(
+        zip(["LBROW", "RBROW", "LLIP", "RLIP"], labels, strict=True)
+    )
+    assert signers_among(["HEAD_1", "HEAD_2", "HEAD_3", "CHIN_1", "CHIN_2", "CHIN_3"], ["1", "2", "3"]) == ()
+
+
+def test_a_subject_that_is_not_there_is_named_with_those_who_are():
+    with pytest.raises(SignfaceError, match=r"no subject called 'Cleo'.*Anna, Ben"):
+        selected(take_of(["Anna:NOSE", "Ben:NOSE"]), SolveSettings(subject="Cleo"))
+
+
 def test_unlabelled_points_have_no_label():
     kept, names, notes = clean_labels(["*1", "A", "Anna:*12", "", "unlabeled_7", "U_3", "B", "Unnamed"])
     assert kept == [1, 6]
@@ -89,6 +135,7 @@ def test_clean_labels_are_unique_and_in_order(labels):
 )
 @settings(max_examples=200, deadline=None)
 def test_no_marker_is_matched_twice_and_exact_names_always_are(take, wanted):
+    take = [label for label in take if ":" not in label or label.rpartition(":")[2] not in wanted]
     found = match_labels(take, wanted)
     assert len(set(found.values())) == len(found)
     assert set(found.values()) <= set(take)

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError, SignfaceWarning
+from signface.marker_names import SeveralSigners
 from signface.takes.formats.openface import read_openface, true_positions
 from signface.takes.formats.openface_units import read_action_units
 from signface.takes.reading import open_recording, read_recording, recognise
@@ -168,6 +169,21 @@ def test_a_table_of_action_units_alone_holds_weights(tmp_path):
     assert found.names == ("AU01", "AU28")
     np.testing.assert_array_equal(found.weights[0], [0.5, 1.0])
     assert np.array_equal(found.head, np.tile(np.eye(4), (9, 1, 1)))
+
+
+def test_of_two_faces_seen_at_once_one_is_chosen(tmp_path):
+    rows = table([0.0, 0.0, 0.1, 0.1, 0.2, 0.2], faces=[0, 1] * 3, units=("AU01_r",)).splitlines()
+    rows[1:] = [",".join([str(number // 2 + 1), *row.split(",")[1:]]) for number, row in enumerate(rows[1:])]
+    file = tmp_path / "two.csv"
+    file.write_text("\n".join(rows) + "\n")
+    for read_as in (None, "aus"):
+        with pytest.raises(SeveralSigners, match=r"2 signers: 0, 1"):
+            open_recording(file, read_as=read_as)
+        one = open_recording(file, read_as=read_as, subject="1")
+        assert one.n_frames == 3
+        assert "face 1 of 2" in one.history
+    with pytest.raises(SignfaceError, match=r"no face '7'.*0, 1"):
+        open_recording(file, subject="7")
 
 
 def test_a_table_with_both_is_read_as_asked_for():

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from signface.descriptors import Descriptors
 from signface.descriptors_files import write_weights
 from signface.errors import SignfaceError
+from signface.marker_names import SeveralSigners
 from signface.takes.formats.c3d import open_c3d, write_c3d
 from signface.takes.formats.table import write_table
 from signface.takes.formats.text import TextFile, TextRows
@@ -284,13 +285,45 @@ def test_depth_that_is_already_in_pixels_is_left_so(tmp_path):
 
 
 def test_landmarks_without_confidence_are_missing_and_the_person_seen_most_is_taken(tmp_path):
-    landmarks = np.stack((pictured() + np.array([5, 5, 0]), pictured()), axis=1)
+    landmarks = np.stack((pictured(frames=12) + np.array([5, 5, 0]), pictured(frames=12)), axis=1)
     confidence = np.ones(landmarks.shape[:3])
     confidence[1:, 0] = 0
     confidence[2, 1, 3] = 0
     take = read_take(write_pose(tmp_path / "two.pose", landmarks, list(LANDMARKS), confidence=confidence))
     assert np.argwhere(np.isnan(take.positions[..., 0])).tolist() == [[2, 3]]
-    assert "person 2 of 2" in " ".join(take.history)
+    assert "person 1 of 2" in " ".join(take.history)
+
+
+def two_people(frames=40):
+    """(F, 2, N, 3) landmarks of two people who sit apart and smile differently, who change their index half-way."""
+    one = np.concatenate([pictured()] * frames)[:frames]
+    other = one + np.array([260, 10, 0])
+    other[:, -1] += np.linspace(0, 9, frames)[:, None] * (1, 0, 0)
+    landmarks = np.stack((one, other), axis=1)
+    landmarks[frames // 2 :] = landmarks[frames // 2 :, ::-1].copy()
+    return landmarks, one, other
+
+
+def test_people_who_change_their_index_stay_themselves(tmp_path):
+    landmarks, one, other = two_people()
+    file = write_pose(tmp_path / "two.pose", landmarks, list(LANDMARKS))
+    with pytest.raises(SeveralSigners, match=r"2 signers: 1, 2"):
+        read_take(file)
+    for subject, alone in (("1", one), ("2", other)):
+        reference = read_take(write_pose(tmp_path / "alone.pose", alone, list(LANDMARKS)))
+        np.testing.assert_allclose(read_take(file, subject=subject).positions, reference.positions, atol=1e-4)
+    with pytest.raises(SignfaceError, match=r"no person '3'.*1, 2"):
+        read_take(file, subject="3")
+
+
+def test_someone_who_passes_by_is_no_signer(tmp_path):
+    landmarks, one, _ = two_people()
+    confidence = np.ones(landmarks.shape[:3])
+    confidence[:20, 1] = 0
+    confidence[24:, 0] = 0  # the other is seen in four frames, under the first index
+    take = read_take(write_pose(tmp_path / "two.pose", landmarks, list(LANDMARKS), confidence=confidence))
+    reference = read_take(write_pose(tmp_path / "alone.pose", one, list(LANDMARKS)))
+    np.testing.assert_allclose(take.positions, reference.positions, atol=1e-4)
 
 
 def test_a_pose_file_without_depth_is_a_flat_face(tmp_path):

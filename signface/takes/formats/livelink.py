@@ -76,6 +76,18 @@ def _rotations(angles: np.ndarray) -> np.ndarray:
     return poses
 
 
+def first_timecode(path: str | PathLike[str]) -> float:
+    """The time of the day of the first frame, in seconds; frames are counted at the recording's rate."""
+    lines = [line for line in read_text(Path(path)).splitlines() if line.strip()]
+    _, separator = header_cells(lines[0])
+    cells = [line.split(separator, 1)[0] for line in lines[1:]]
+    _, rate = _frames(cells, Path(path))
+    match = TIMECODE.match(cells[0])
+    assert match is not None
+    hours, minutes, seconds, frame, part = (float(field or 0) for field in match.groups())
+    return 3600 * hours + 60 * minutes + seconds + (frame + part) / rate
+
+
 def _certainty(head: FileHead) -> float:
     return 0.9 * ([cell.lower() for cell in head.cells[:2]] == ["timecode", "blendshapecount"])
 
@@ -87,6 +99,7 @@ def _certainty(head: FileHead) -> float:
     endings=(".csv",),
     recognise=_certainty,
     holds="weights",
+    timecode=first_timecode,
 )
 def read_livelink(path: str | PathLike[str], *, unit: str | None = None) -> Descriptors:
     """Read the weights of a Live Link Face CSV.

@@ -61,11 +61,12 @@ def true_positions(landmarks: np.ndarray) -> np.ndarray:
     written_by="OpenFace 2 (FeatureExtraction), its 68 landmarks in millimetres",
     endings=(".csv",),
     recognise=_landmark_certainty,
+    chooses_subject=True,
 )
-def read_openface(path: str | PathLike[str], *, unit: str | None = None) -> Take:
+def read_openface(path: str | PathLike[str], *, unit: str | None = None, subject: str | None = None) -> Take:
     """Read the 3-D landmarks of an OpenFace table as a take; landmark 30 has the label `L30`.
 
-    Frames of low confidence or without success are missing, of several faces the one seen most is taken, and uneven
+    Frames of low confidence or without success are missing, of several faces the chosen one is taken, and uneven
     times are put on an even grid. What OpenFace's way of writing points does to a turning head is undone
     (`true_positions`). The pose of the head is in the landmarks.
 
@@ -74,6 +75,8 @@ def read_openface(path: str | PathLike[str], *, unit: str | None = None) -> Take
     path : path
     unit : str, optional
         Not used: the file is in millimetres.
+    subject : str, optional
+        The number of the face, of several.
 
     Raises
     ------
@@ -82,7 +85,7 @@ def read_openface(path: str | PathLike[str], *, unit: str | None = None) -> Take
     """
     del unit
     file = Path(path)
-    table = read_table(file)
+    table = read_table(file, subject)
     known = set(table.columns)
     numbers = [number for number in range(LANDMARKS) if f"X_{number}" in known]
     partial = [number for number in numbers if not {f"Y_{number}", f"Z_{number}"} <= known]

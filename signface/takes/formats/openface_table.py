@@ -17,6 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from signface.errors import SignfaceError, SignfaceWarning
+from signface.marker_names import SeveralSigners
+from signface.takes.formats.people import RIVAL
 from signface.takes.formats.text import TextFile, TextRows, header_cells
 from signface.takes.formats.uneven import even_frames
 
@@ -46,11 +48,20 @@ class Table(NamedTuple):
         return self.values[:, [self.columns.index(name) for name in names]]
 
 
-def read_table(path: str | PathLike[str]) -> Table:
-    """The columns of the face that is seen most; NaN where it was not found, at even times.
+def read_table(path: str | PathLike[str], subject: str | None = None) -> Table:
+    """The columns of one face; NaN where it was not found, at even times.
+
+    Parameters
+    ----------
+    path : path
+    subject : str, optional
+        The number of the face, as in `face_id`; the one seen most where the others are seen too little to be signers
+        (`signface.takes.formats.people.RIVAL`).
 
     Raises
     ------
+    SeveralSigners
+        Several faces are seen much, and none was chosen.
     SignfaceError
         A row is cut short or holds words, no face was found, or the times do not rise.
     """
@@ -63,7 +74,7 @@ def read_table(path: str | PathLike[str]) -> Table:
     rows = TextRows(text, 1, len(columns), separator)
     values = rows.values(0, len(rows))
     notes: list[str] = []
-    values, more = _one_face(values, columns)
+    values, more = _one_face(values, columns, subject, file)
     notes += more
     times, more = _times(values, columns, file)
     notes += more
@@ -81,18 +92,38 @@ def read_table(path: str | PathLike[str]) -> Table:
     return Table(values, columns, rate, float(times[0]), (*notes, *more))
 
 
-def _one_face(values: np.ndarray, columns: list[str]) -> tuple[np.ndarray, list[str]]:
-    """The rows of the face that is seen most surely, where there are several."""
+def _one_face(values: np.ndarray, columns: list[str], subject: str | None, file: Path) -> tuple[np.ndarray, list[str]]:
+    """The rows of the face that was chosen, or else that is seen most surely, where there are several."""
     if "face_id" not in columns:
+        if subject is not None:
+            raise SignfaceError("has one face, without a number", file=file, hint="leave out --subject")
         return values, []
     faces = values[:, columns.index("face_id")]
     known = np.unique(faces[np.isfinite(faces)])
+    if subject is not None:
+        names = [f"{face:g}" for face in known]
+        if subject not in names:
+            raise SignfaceError(f"has no face {subject!r}", file=file, hint=f"its faces are {', '.join(names[:12])}")
+        return values[faces == float(subject)], [f"face {subject} of {len(known)}"]
     if len(known) < 2:
         return values, []
     sure = values[:, columns.index("confidence")] if "confidence" in columns else np.ones(len(values))
     total = [np.nansum(sure[faces == face]) for face in known]
+    rivals = [f"{face:g}" for face, much in zip(known, total, strict=True) if much >= RIVAL * max(total)]
+    if len(rivals) > 1 and _at_once(values, columns, [float(rival) for rival in rivals]):
+        raise SeveralSigners.named(rivals, str(file))
     chosen = known[int(np.argmax(total))]
     return values[faces == chosen], [f"took face {chosen:g} of {len(known)}, the one seen most"]
+
+
+def _at_once(values: np.ndarray, columns: list[str], faces: list[float]) -> bool:
+    """Whether two of the faces are seen in one frame: else it may be one person who was found again."""
+    name = next(name for name in ("frame", "timestamp") if name in columns)
+    shown = values[np.isin(values[:, columns.index("face_id")], faces)]
+    if "success" in columns:
+        shown = shown[shown[:, columns.index("success")] > 0]
+    times = shown[:, columns.index(name)]
+    return len(np.unique(times)) < len(times)
 
 
 def _times(values: np.ndarray, columns: list[str], file: Path) -> tuple[np.ndarray, list[str]]:

@@ -33,8 +33,9 @@ def _unit_certainty(head: FileHead) -> float:
     endings=(".csv",),
     recognise=_unit_certainty,
     holds="weights",
+    chooses_subject=True,
 )
-def read_action_units(path: str | PathLike[str], *, unit: str | None = None) -> Descriptors:
+def read_action_units(path: str | PathLike[str], *, unit: str | None = None, subject: str | None = None) -> Descriptors:
     """Read the action units of an OpenFace table as weights, and the head's pose where it is there.
 
     The intensity `AU01_r` (0 to 5), divided by 5, becomes the weight `AU01`. Whether a unit is there at all (`AU28_c`,
@@ -45,6 +46,8 @@ def read_action_units(path: str | PathLike[str], *, unit: str | None = None) -> 
     path : path
     unit : str, optional
         Not used: action units have no unit of length.
+    subject : str, optional
+        The number of the face, of several.
 
     Raises
     ------
@@ -53,7 +56,7 @@ def read_action_units(path: str | PathLike[str], *, unit: str | None = None) -> 
     """
     del unit
     file = Path(path)
-    table = read_table(file)
+    table = read_table(file, subject)
     there = [name for name in table.columns if _UNIT.fullmatch(name)]
     columns = [name for name in there if name.endswith("_r") or f"{name[:4]}_r" not in there]
     if not columns:

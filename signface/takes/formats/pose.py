@@ -17,6 +17,8 @@ import numpy as np
 
 from signface.errors import SignfaceError
 from signface.files import reading
+from signface.marker_names import SeveralSigners
+from signface.takes.formats.people import RIVAL, followed
 from signface.takes.formats.registry import FileHead, register_format
 from signface.takes.take import Take
 
@@ -32,7 +34,7 @@ EYE_CORNERS = (("33", "263", 89.5), ("133", "362", 32.5))
 FLATTEST_FACE = 0.05
 
 
-def _landmarks(pose: Any, file: Path) -> tuple[np.ndarray, np.ndarray, list[str], list[str], bool]:
+def _landmarks(pose: Any, file: Path, subject: str | None) -> tuple[np.ndarray, np.ndarray, list[str], list[str], bool]:
     """(F, N, 3) raw landmarks, (F, N) confidence, names, notes, and whether there is a depth."""
     names = [component.name for component in pose.header.components]
     if FACE not in names:
@@ -49,10 +51,20 @@ def _landmarks(pose: Any, file: Path) -> tuple[np.ndarray, np.ndarray, list[str]
     confidence = np.array(np.ma.getdata(pose.body.confidence)[:, :, points], dtype=np.float64)
     if 0 in data.shape[:3]:
         raise SignfaceError("the .pose file shows nobody", file=file, hint="extract it again")
-    notes = []
-    person = int(np.argmax((confidence > 0).sum(axis=(0, 2))))
+    data, confidence, notes = followed(data, confidence)
+    people = [str(number + 1) for number in range(data.shape[1])]
+    if subject is not None:
+        if subject not in people:
+            raise SignfaceError(f"shows no person {subject!r}", file=file, hint=f"its persons are {', '.join(people)}")
+        person = people.index(subject)
+    else:
+        seen = (confidence > 0).any(axis=2).sum(axis=0)
+        rivals = [str(number + 1) for number, frames in enumerate(seen) if frames >= RIVAL * max(seen)]
+        if len(rivals) > 1:
+            raise SeveralSigners.named(rivals, str(file))
+        person = int(np.argmax(seen))
     if data.shape[1] > 1:
-        notes.append(f"took person {person + 1} of {data.shape[1]}, the one seen most")
+        notes.append(f"person {person + 1} of {data.shape[1]}")
     data, confidence = data[:, person], confidence[:, person]
     deep = data.shape[2] >= 3 and "Z" in component.format
     landmarks = np.zeros((*data.shape[:2], 3))
@@ -98,20 +110,27 @@ def _certainty(head: FileHead) -> float:
 
 
 @register_format(
-    "pose", title=".pose", written_by="pose-format, from MediaPipe Holistic", endings=(".pose",), recognise=_certainty
+    "pose",
+    title=".pose",
+    written_by="pose-format, from MediaPipe Holistic",
+    endings=(".pose",),
+    recognise=_certainty,
+    chooses_subject=True,
 )
-def read_pose(path: str | PathLike[str], *, unit: str | None = None) -> Take:
+def read_pose(path: str | PathLike[str], *, unit: str | None = None, subject: str | None = None) -> Take:
     """Read the face landmarks of a `.pose` file as a take; labels are the landmarks' indices ("33", "263").
 
     Works with the 468, the 478 (with irises) and the 128-point (contours) sets. A landmark is missing where its
-    confidence is 0. Where a file holds several people, the one seen most is taken. The scale is one number for the
-    whole take: nearer and farther from the camera remain visible as growing and shrinking.
+    confidence is 0. People are followed by where they are, whatever their index (`people.followed`). The scale is one
+    number for the whole take: nearer and farther from the camera remain visible as growing and shrinking.
 
     Parameters
     ----------
     path : path
     unit : str, optional
         Not used: a picture has no unit of length. The scale is noted in the history.
+    subject : str, optional
+        The number of the person, from 1 for the leftmost in the picture when they appear, where several are seen much.
 
     Raises
     ------
@@ -132,7 +151,7 @@ def read_pose(path: str | PathLike[str], *, unit: str | None = None) -> Take:
     rate = float(pose.body.fps)
     if not (np.isfinite(rate) and rate > 0):
         raise SignfaceError("the .pose file has the rate 0", file=file, hint="extract it again from the video")
-    landmarks, confidence, names, notes, deep = _landmarks(pose, file)
+    landmarks, confidence, names, notes, deep = _landmarks(pose, file, subject)
     missing = ~(confidence > 0) | ~np.isfinite(landmarks).all(axis=2) | (np.abs(landmarks) > 1e6).any(axis=2)
     landmarks[missing] = np.nan
     if missing.all():

@@ -107,6 +107,8 @@ class Format:
     recognise: Callable[[FileHead], float]
     open: Opener
     holds: Literal["markers", "weights"] = "markers"
+    chooses_subject: bool = False
+    timecode: Callable[[str | PathLike[str]], float] | None = None
 
     def certainty(self, head: FileHead) -> float:
         """How surely a file is of this format, 0 to 1. What `recognise` stumbles over is no file of the format."""
@@ -131,6 +133,8 @@ def register_format(
     written_by: str = "",
     endings: Sequence[str] = (),
     holds: Literal["markers", "weights"] = "markers",
+    chooses_subject: bool = False,
+    timecode: Callable[[str | PathLike[str]], float] | None = None,
 ) -> Callable[[AnyOpener], AnyOpener]:
     """Declare that a function opens files of a format; `open_recording` and every command then read them.
 
@@ -151,6 +155,11 @@ def register_format(
         The endings (`.c3d`) that its files usually have. They only serve for a better error.
     holds : str
         `markers`, or `weights` where files hold blendshape weights: then `open` gives `Descriptors`.
+    chooses_subject : bool
+        Whether `open` is also given `subject`: whose weights, of several people in a file. Readers of markers need not:
+        they name them `Anna:LBRO` and `Ben:LBRO`.
+    timecode : callable, optional
+        `timecode(path)` gives the time of the day of the first frame, in seconds.
 
     Returns
     -------
@@ -177,7 +186,9 @@ def register_format(
     def register(open: AnyOpener) -> AnyOpener:
         if open.__module__ not in SHIPPED:
             _import_all()  # so that they do not replace or precede it later
-        _formats[name] = Format(name, title or name, written_by, tuple(endings), recognise, open, holds)
+        _formats[name] = Format(
+            name, title or name, written_by, tuple(endings), recognise, open, holds, chooses_subject, timecode
+        )
         return open
 
     return register
