@@ -22,6 +22,7 @@ from signface.content import Content
 from signface.descriptors import Descriptors
 from signface.errors import counted
 from signface.signer import Signer
+from signface.trust import Stretch, untrusted, worst
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -199,6 +200,25 @@ class Annotation(Content):
         assert self.descriptors.residual is not None
         return median_known(self.descriptors.residual)
 
+    @property
+    def _residuals(self) -> np.ndarray:
+        assert self.descriptors.residual is not None
+        return self.descriptors.residual
+
+    @cached_property
+    def untrusted(self) -> tuple[Stretch, ...]:
+        """The stretches in which the solved face lies too far from the markers (`signface.trust.untrusted`)."""
+        return tuple(untrusted(self._residuals, self.descriptors.rate, self.descriptors.start))
+
+    @property
+    def _untrusted(self) -> str:
+        return ", ".join(f"{one.start_s:.3f} to {one.end_s:.3f} s" for one in self.untrusted)
+
+    @property
+    def wrong_markers(self) -> str:
+        """Ghosts, swapped and frozen markers, in words; empty where there were none, or nobody looked."""
+        return self.descriptors.wrong_markers
+
     @cached_property
     def jitter(self) -> Jitter | None:
         """What of the motion is jitter of the tracker; None for a take of fewer than three frames."""
@@ -211,10 +231,12 @@ class Annotation(Content):
         """What the header of an EAF says of it: `model`, `take`, `residual_mm`.
 
         And, where there are any, the bases that the markers cannot see (`unobserved`), the values of channels that
-        they cannot show (`unseen`), and that the take is unlike what the model knows (`unlike`).
+        they cannot show (`unseen`), that the take is unlike what the model knows (`unlike`), the stretches that cannot
+        be trusted (`untrusted`) and the markers that were wrong (`markers`).
         """
         residual = "unknown" if self.residual_mm is None else f"{self.residual_mm:.2f}"
         more = {"unobserved": joined_sides(self.descriptors.unobserved), "unseen": self._unseen, "unlike": self.unlike}
+        more |= {"untrusted": ", ".join(map(str, self.untrusted)), "markers": self.wrong_markers}
         told = {name: text for name, text in more.items() if text}
         return {"model": self.model, "take": self.name, "residual_mm": residual, **told}
 
@@ -246,6 +268,10 @@ class Annotation(Content):
             labels.append(f"{self.vocabulary.describe(str(label))} {total:.1f} s (confidence {confidence:.0%})")
         residual = self.residual_mm
         fit = "" if residual is None else f"; the solved face lies {residual:.2f} mm from the markers (median residual)"
+        at_worst = worst(self._residuals, self.descriptors.rate, self.descriptors.start)
+        fit += f", at worst {at_worst}" if at_worst is not None else ""
+        fit += f"; do not trust {self._untrusted}" if self.untrusted else ""
+        fit += f"; {self.wrong_markers}" if self.wrong_markers else ""
         fit += "" if self.jitter is None else f"; {self.jitter}"
         duration = f"{self.descriptors.duration:.1f} s"
         blind = joined_sides(self.descriptors.unobserved)

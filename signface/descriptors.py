@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from signface.settings.solve import SolveSettings
 
 
+#: How the check of markers (`signface.takes.marker_check`) begins its line of the history; what it says for nothing.
+CHECKED, NOTHING_WRONG, TOO_FEW = "check_markers: ", "nothing wrong", "too few markers to tell"
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Descriptors(TimedArrays, Summary, Content):
     """Blendshape weights of a take.
@@ -121,6 +125,12 @@ class Descriptors(TimedArrays, Summary, Content):
     def n_frames(self) -> int:
         """Number of frames F."""
         return self.weights.shape[0]
+
+    @property
+    def wrong_markers(self) -> str:
+        """What the check of markers found before the solve, in words; empty where it found nothing, or did not look."""
+        notes = [step.removeprefix(CHECKED) for step in self.history if step.startswith(CHECKED)]
+        return next((note for note in notes if note not in (NOTHING_WRONG, TOO_FEW)), "")
 
     def weight(self, name: str) -> np.ndarray:
         """(F,) weights of one base, by name.

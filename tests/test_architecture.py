@@ -22,6 +22,7 @@ FLOORS = [
     "extras",
     "compiling",
     "frames",
+    "trust",
     "content",
     "columns",
     "marker_names",

@@ -48,11 +48,11 @@ def run(arguments: argparse.Namespace) -> int:
     one_thread_for_matrices()
     import numpy as np
 
-    from signface.annotation import median_known
     from signface.columns import joined_sides
     from signface.descriptors_files import WeightsWriter
     from signface.solver.solving import solve_pieces
     from signface.takes.reading import open_recording
+    from signface.trust import residual_words
 
     ending = arguments.output.suffix.lower()
     suffix = ending if ending in (".csv", ".parquet") else f".{arguments.format}"
@@ -97,8 +97,10 @@ def run(arguments: argparse.Namespace) -> int:
         for note in piece.history:
             if note.startswith("warning: "):
                 print(f"signface: {file}: {note}", file=sys.stderr)
-        residual = median_known(np.concatenate(residuals))
-        fit = "unknown" if residual is None else f"{residual:.2f} mm"
+        residual = np.concatenate(residuals)
+        start = piece.start - (len(residual) - piece.n_frames) / piece.rate
+        fit = residual_words(residual, piece.rate, start)
+        wrong = f"; {piece.wrong_markers}" if piece.wrong_markers else ""
         blind = f"; no marker shows {joined_sides(piece.unobserved)}" if piece.unobserved else ""
-        print(f"{file}: {writer.frames} frames, {len(piece.names)} bases, median residual {fit}{blind}")
+        print(f"{file}: {writer.frames} frames, {len(piece.names)} bases, {fit}{wrong}{blind}")
     return 2 if failed else 0

@@ -9,6 +9,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,6 +19,7 @@ from signface.content import Content
 from signface.errors import SignfaceError
 from signface.label.vocabulary import AFFECT, INTENSITY, Vocabulary
 from signface.segmentation.segments import Segments
+from signface.trust import Stretch
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,11 +154,14 @@ def doubtful_tier(
     segments: Segments,
     signer: str = "",
     *,
-    below: float = 0.5,
+    below: float | None = 0.5,
+    untrusted: Sequence[Stretch] = (),
     channel: str = "affect",
     vocabulary: Vocabulary = AFFECT,
 ) -> Tier:
     """The tier `CHANNEL-doubtful@SIGNER`: the segments whose confidence is low, for an annotator to go through first.
+
+    So are those that reach into a stretch in which the solved face lies too far from the markers.
 
     Parameters
     ----------
@@ -164,7 +169,9 @@ def doubtful_tier(
         With `label` and `confidence`.
     signer : str
     below : float
-        Segments with a confidence under it are taken.
+        Segments with a confidence under it are taken; None for none of them.
+    untrusted : sequence of Stretch
+        Stretches that cannot be trusted (`signface.trust.untrusted`).
     channel : str
     vocabulary : Vocabulary
 
@@ -174,9 +181,13 @@ def doubtful_tier(
         As `label_tier`, or the segments carry no confidence.
     """
     table, start_ms, end_ms = _after_time_0(segments, vocabulary)
-    if "confidence" not in table.columns:
-        raise SignfaceError(f"{segments.name}: the segments carry no confidence", hint="label them first")
-    low = table["confidence"].to_numpy(float) < below
+    low = np.zeros(len(table), dtype=bool)
+    if below is not None:
+        if "confidence" not in table.columns:
+            raise SignfaceError(f"{segments.name}: the segments carry no confidence", hint="label them first")
+        low = table["confidence"].to_numpy(float) < below
+    for one in untrusted:
+        low |= ((table["start_s"] < one.end_s) & (table["end_s"] > one.start_s)).to_numpy(bool)
     labels = tuple(str(label) for label in table["label"][low])
     return Tier(f"{channel}-doubtful", signer, start_ms[low], end_ms[low], labels, vocabulary)
 

@@ -225,8 +225,13 @@ def prepare(
             label_tier(one.segments, signer, channel=one.tier, vocabulary=one.vocabulary)
             for one in getattr(annotation, "clauses", ())
         ]
-    if options.doubtful is not None:
-        tiers = [doubtful_tier(segments, signer, below=options.doubtful, channel=tier, vocabulary=vocabulary), *tiers]
+    untrusted = getattr(annotation, "untrusted", ())
+    if options.doubtful is not None or untrusted:
+        below = options.doubtful
+        doubtful = doubtful_tier(
+            segments, signer, below=below, untrusted=untrusted, channel=tier, vocabulary=vocabulary
+        )
+        tiers = [doubtful, *tiers] if below is not None or doubtful.values else tiers
     all_tiers = (label_tier(segments, signer, channel=tier, vocabulary=vocabulary), *tiers)
     rules = {} if options.mapping is None else read_mapping(options.mapping)
     links: tuple[Path, ...] = ()

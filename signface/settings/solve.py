@@ -85,6 +85,11 @@ class SolveSettings(Settings):
     creep: bool | None = option(
         None, help="do not take away what the markers creep on the skin", kind=bool, flag="--keep-creep"
     )
+    check_markers: bool = option(
+        True,
+        help="look for ghosts, swapped and frozen markers before the solve, and mend them or leave them out",
+        kind=bool,
+    )
     short_gap_s: float | None = number(
         help="longest gap that a spline fills (default: 0.05 s)", flag="--short-gap", metavar="SECONDS"
     )

@@ -87,8 +87,10 @@ class Preparation:
         progress: Progress = silently,
     ) -> None:
         settings = SolveSettings() if settings is None else settings
-        cleaning = _cleaning(layout, settings)
-        self.recording = clean = Kept(View(recording).through(*cleaning).recording)
+        cleaning = _cleaning(layout, settings, face)
+        # What lies in one piece is read once: the check of markers goes over it to learn.
+        source = Kept(recording) if recording.n_frames <= piece else recording
+        self.recording = clean = Kept(View(source).through(*cleaning).recording)
         labels = [label for label in layout.face_labels if label in clean.labels]
         head = [label for label in layout.head_labels if label in clean.labels]
         if len(labels) < 4:
@@ -252,7 +254,9 @@ def prepare_take(
     return PreparedTake(*preparation.frames(0, recording.n_frames), preparation)
 
 
-def _cleaning(layout: MarkerLayout, settings: SolveSettings) -> tuple[Stage, ...]:
-    """The stages that give the layout's markers without gaps and jitter."""
+def _cleaning(layout: MarkerLayout, settings: SolveSettings, face: FaceModel) -> tuple[Stage, ...]:
+    """The stages that give the layout's markers in their right places, without gaps and jitter."""
+    known = dict(zip(layout.labels, layout.points(face, layout.labels), strict=True))
     given = {name: getattr(settings, name) for name in ("short_gap_s", "long_gap_s", "cutoff_hz", "filter_method")}
-    return cleaning_stages(layout.labels, **{name: value for name, value in given.items() if value is not None})
+    chosen = {name: value for name, value in given.items() if value is not None}
+    return cleaning_stages(layout.labels, check=settings.check_markers, known=known, **chosen)

@@ -25,6 +25,8 @@ from signface.takes.take import Take
 
 #: Frames on which a candidate is tried.
 FRAMES = 60
+#: A frame with so many times the energy of the most energetic tenth's least is left out: no face does that.
+OUTLYING = 4.0
 
 
 def resting_time(take: Take, face: FaceModel, layout: MarkerLayout, *, adaptation: str = "similarity") -> float:
@@ -96,5 +98,7 @@ def _unexplained(
     solved = np.isfinite(solution.weights).all(axis=1)
     if not solved.any():
         return np.inf
-    energy = solver.energy(solution.weights[solved], displacements[solved]).mean()
-    return float(energy / max(np.nanmean(displacements[solved] ** 2), 1e-12))
+    energy = solver.energy(solution.weights[solved], displacements[solved])
+    # One marker that is nowhere near the face, in one frame, must not outweigh all that the face does in the others.
+    usual = energy <= OUTLYING * np.quantile(energy, 0.9)
+    return float(energy[usual].mean() / max(np.nanmean(displacements[solved][usual] ** 2), 1e-12))

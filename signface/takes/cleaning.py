@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from signface.frames import Timed
 from signface.takes.filtering import CUTOFF_HZ, Lowpass
 from signface.takes.gaps import LONG_S, SHORT_S, GapFiller
 from signface.takes.labels import Renaming
+from signface.takes.marker_check import MarkerCheck
 from signface.takes.recording import PIECE, Recording, pieces
 from signface.takes.stages import Stage
 from signface.takes.take import Take
@@ -86,6 +87,8 @@ def cleaning_stages(
     long_gap_s: float = LONG_S,
     cutoff_hz: float = CUTOFF_HZ,
     filter_method: str = "butterworth",
+    check: bool = False,
+    known: Mapping[str, np.ndarray] | None = None,
 ) -> tuple[Stage, ...]:
     """The markers of a layout, with gaps filled and filtered.
 
@@ -98,6 +101,10 @@ def cleaning_stages(
     cutoff_hz, filter_method
         See `signface.takes.filtering.lowpass`. With `raised-sine` every frame depends on all others: each piece costs
         the whole recording.
+    check : bool
+        Also look for ghosts, swapped and frozen markers, before gaps are filled.
+    known : mapping of str to (3,) array, optional
+        See `signface.takes.marker_check.MarkerCheck`.
 
     Raises
     ------
@@ -119,6 +126,7 @@ def cleaning_stages(
     """
     return (
         Renaming(labels),
+        *([MarkerCheck(known)] if check else []),
         GapFiller(short_s=short_gap_s, long_s=long_gap_s),
         Lowpass(cutoff_hz=cutoff_hz, method=filter_method),
     )

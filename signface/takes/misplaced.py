@@ -8,22 +8,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
 from signface.frames import runs
 from signface.takes.usual_places import UsualPlaces
 
-#: A marker can be told from its neighbours where the nearest of them is farther than this many times what both stray, and
-#: than this (mm).
+#: A marker can be told from its neighbours where the nearest of them is farther than this many times what both stray,
+#: and than this (mm).
 APART, APART_MM = 4.0, 5.0
 #: It may be in a neighbour's place where it has come this part of the way to the nearest one.
 ON_THE_WAY = 0.5
-#: An exchange is one where at least this part of what it would explain at best is explained, and where at most this part
-#: of the way is left, to the place of each but for what all exchanged ones share.
+#: An exchange is one where at least this part of what it would explain at best is explained, and where at most this
+#: part of the way is left, to the place of each but for what all exchanged ones share.
 EXPLAINED, LEFT = 0.6, 0.5
-#: A marker is in a missing one's place where this part of the way is left at most. To be told in another's place, missing
-#: or not, it must have gone so far (mm): lips close on one another.
+#: A marker is in a missing one's place where this part of the way is left at most. To be told in another's place,
+#: missing or not, it must have gone so far (mm): lips close on one another.
 LEFT_TO_MISSING, WAY_MM = 0.3, 8.0
 #: Two markers are in one place where they are nearer than this (mm), and one of them has come this part of the way.
 ONE_PLACE_MM, COME = 0.1, 0.9
@@ -63,7 +64,7 @@ def permuted(usual: UsualPlaces, places: np.ndarray, away: np.ndarray) -> Iterat
 
 
 def _nearest(usual: UsualPlaces) -> np.ndarray:
-    """(M,) distance of each marker's usual place to the nearest other one, mm; inf where the two cannot be told apart."""
+    """(M,) distance of each marker's usual place to the nearest other, mm; inf where the two cannot be told apart."""
     distances = np.linalg.norm(usual.middle[:, None] - usual.middle[None], axis=2)
     np.fill_diagonal(distances, np.inf)
     distances = np.where(np.isfinite(distances), distances, np.inf)
@@ -148,7 +149,7 @@ def ghosts(places: np.ndarray, away: np.ndarray, jump: np.ndarray, with_all: flo
         far, at = away[:, marker], jumped[:, marker]
         for begin, end in runs(np.isfinite(far)).tolist():
             cuts = [begin, *(np.flatnonzero(at[begin : end - 1]) + begin + 1).tolist(), end]
-            for first, last in zip(cuts[:-1], cuts[1:]):
+            for first, last in pairwise(cuts):
                 beside = [far[edge] for edge in (first - 1, last) if begin <= edge < end]
                 short = last - first <= (longest if len(beside) == 2 else longest // 4)
                 if beside and short and np.median(far[first:last]) > max(beside):

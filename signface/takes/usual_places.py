@@ -17,12 +17,16 @@ from signface.takes.rigid import apply, flatness, inverse, rigid_transforms
 #: Fewer markers do not tell which of them is wrong.
 LEAST_MARKERS = 5
 
-#: A marker this far (mm) from its usual place, or this many times what is usual among all, counts half in the head's pose.
+#: A marker this far (mm) from its usual place, or this many times what is usual among all, counts half in the pose.
 HALF_MM, HALF = 4.0, 3.0
 #: Poses are found again, with far markers counting less, in frames where one is farther than this (mm, times usual).
 BUSY_MM, BUSY = 15.0, 6.0
 #: So many times at most, and until no marker moves by more than this (mm).
 TURNS, SETTLED_MM = 8, 0.1
+
+#: A marker farther from its usual place than this (mm), and than this many times what is usual for it, is no part of
+#: the face: a jaw opens by 50 mm.
+FAR_MM, FAR = 60.0, 12.0
 
 #: No marker counts as stiller than this (mm): a few that hardly move would otherwise draw the poses to themselves.
 STILLEST_MM = 1.0
@@ -83,6 +87,11 @@ class UsualPlaces:
         places[blind] = away[blind] = np.nan
         away[~seen] = np.nan
         return places, away
+
+    def too_far(self, away: np.ndarray) -> np.ndarray:
+        """(F, M) bool: markers that are farther away (F, M; mm) than any part of a face goes."""
+        with np.errstate(invalid="ignore"):
+            return away > np.maximum(FAR_MM, FAR * self.stray)
 
     def renamed(self, owners: Mapping[int, int]) -> UsualPlaces:
         """The same with the places of `{marker: whose place it has}` set right."""
