@@ -26,7 +26,7 @@ from signface.takes.take import Take
 #: Frames on which a candidate is tried.
 FRAMES = 60
 #: A frame with so many times the energy of the most energetic tenth's least is left out: no face does that.
-OUTLYING = 4.0
+OUTLYING = 6.0
 
 
 def resting_time(take: Take, face: FaceModel, layout: MarkerLayout, *, adaptation: str = "similarity") -> float:
