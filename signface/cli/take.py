@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import asdict
 from typing import Any
 
 EXAMPLE = "  signface take info take.c3d\n  signface take info recordings/*.c3d --json"
@@ -14,8 +15,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", metavar="info", required=True)
     info = actions.add_parser(
         "info",
-        help="frames, rate, duration, unit, markers, gaps, head markers",
-        description="Say what a recording holds: frames, rate, duration, unit, markers, gaps, head markers.",
+        help="frames, rate, duration, unit, markers, gaps, head markers, and markers that are wrong",
+        description="Say what a recording holds: frames, rate, duration, unit, markers, gaps, head markers; and which"
+        " markers are ghosts, swapped or frozen.",
         epilog=f"example:\n{EXAMPLE}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -65,6 +67,9 @@ def _report(file: str, content: dict[str, Any]) -> str:
             lines.append(f"  gaps of {label}: {gap['gaps']}, {span}")
         if len(gaps) > 12:
             lines.append(f"  and {len(gaps) - 12} more markers with gaps")
+        wrong = content["wrong_markers"]
+        lines += [f"  wrong: {one['text']}" for one in wrong[:12]] or ["  wrong markers: none found"]
+        lines += [f"  and {len(wrong) - 12} more that are wrong"] if len(wrong) > 12 else []
         if content["layout"] is None:
             lines.append(f"  layout: none of the shipped ones ({content['note']})")
         else:
@@ -80,7 +85,7 @@ def _report(file: str, content: dict[str, Any]) -> str:
 def run(arguments: argparse.Namespace) -> int:
     """Describe each take; 0 unless one cannot be read."""
     from signface.face.reading import read_face
-    from signface.solver.recognition import recognise_layout
+    from signface.solver.recognition import recognise_layout, wrong_markers
     from signface.takes.description import describe_take, describe_weights
     from signface.takes.reading import read_recording
     from signface.takes.take import Take
@@ -91,7 +96,9 @@ def run(arguments: argparse.Namespace) -> int:
         if isinstance(recording, Take):
             content = describe_take(recording)
             history = content.pop("history")
-            content |= {**recognise_layout(recording, read_face(arguments.face)), "history": history}
+            face = read_face(arguments.face)
+            wrong = [{**asdict(one), "text": str(one)} for one in wrong_markers(recording, face)]
+            content |= {"wrong_markers": wrong, **recognise_layout(recording, face), "history": history}
         else:
             content = describe_weights(recording)
         if arguments.json:

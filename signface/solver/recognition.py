@@ -1,4 +1,8 @@
-"""`recognise_layout`: which shipped layout the markers of a take are, and which of its markers the take has."""
+"""What markers a take has, and which of them are wrong, before it is solved.
+
+- `recognise_layout`: which shipped layout they are, and which of its markers the take has.
+- `wrong_markers`: ghosts, swapped and frozen ones.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,8 @@ from signface.errors import SignfaceError
 from signface.face.layout_files import choose_layout
 from signface.face.model import FaceModel
 from signface.solver.layout_fit import check_take
-from signface.takes.labels import match_labels
+from signface.takes.labels import match_labels, rename_to
+from signface.takes.marker_check import Finding, check_markers
 from signface.takes.take import Take
 
 
@@ -45,3 +50,26 @@ def recognise_layout(take: Take, face: FaceModel) -> dict[str, Any]:
         "head_markers": [label for label in layout.head_labels if label in present],
         "missing": [label for label in layout.labels if label not in present],
     }
+
+
+def wrong_markers(take: Take, face: FaceModel) -> list[Finding]:
+    """Ghosts, swapped and frozen markers of a take, as the check before a solve finds them.
+
+    The markers are those of the shipped layout that fits the take best; all of its markers where none does.
+
+    See Also
+    --------
+    signface.takes.marker_check.check_markers : also mends them.
+
+    Examples
+    --------
+    >>> import signface as sf
+    >>> wrong_markers(sf.datasets.mini_take(), sf.read_face())
+    []
+    """
+    try:
+        layout = choose_layout(take.labels, face)
+        renamed = rename_to(take, layout.labels)
+    except SignfaceError:
+        return check_markers(take)[1]
+    return check_markers(renamed, dict(zip(layout.labels, layout.points(face, layout.labels), strict=True)))[1]

@@ -37,8 +37,9 @@ UNUSUAL, WITH_ALL = 8.0, 4.0
 GHOST_S = 0.25
 #: A marker that does not move at all for so long (s, and frames), while most others do, is frozen.
 FROZEN_S, FROZEN_FRAMES = 0.1, 5
-#: In coarse recordings (whole pixels) markers stand still by chance: so long that one in so many frames would.
-BY_CHANCE = 1e-6
+#: In coarse recordings (whole pixels) markers stand still by chance: only what is so improbable counts, and only what
+#: is so many times as long as most markers stand still.
+BY_CHANCE, STILL = 1e-6, 3.0
 #: Recordings in which only longer stillness would say something (s) are not looked at for it.
 LONGEST_FROZEN_S = 5.0
 #: Where more than this part of the markers would be left out, the frame is left as it is, and named.
@@ -125,7 +126,7 @@ def check_markers(take: Take, known: Mapping[str, np.ndarray] | None = None) -> 
     >>> positions[500, 7] += (300, 200, 100)
     >>> mended, found = check_markers(take.changed("a reflection", positions=positions))
     >>> print(*found)
-    LEYEU a ghost at 2.500 s (left out)
+    RFORE a ghost at 2.500 s (left out)
     >>> bool(np.isnan(mended.positions[500, 7]).all())
     True
     """
@@ -171,7 +172,9 @@ class MarkerCheck(Stage):
         share = np.concatenate(equal)
         still = float(np.median(share.mean(axis=0))) if len(share) else 1.0
         chance = np.log(BY_CHANCE) / np.log(still) if 0 < still < 1 else np.inf * still
-        self._frozen = max(FROZEN_FRAMES, FROZEN_S * self._rate, chance)
+        longest = [[max((end - begin for begin, end in runs(one)), default=0) for one in part.T] for part in equal]
+        usual_run = STILL * float(np.quantile(np.max(longest, axis=0), 0.9)) if longest else 0.0
+        self._frozen = max(FROZEN_FRAMES, FROZEN_S * self._rate, chance, usual_run)
         if self._frozen < LONGEST_FROZEN_S * self._rate:
             self.reach = max(self.reach, int(self._frozen) + 2)
 
@@ -232,7 +235,8 @@ class MarkerCheck(Stage):
         self, block: Block, exchanged: Iterator[tuple[int, dict[int, int]]], misnamed: np.ndarray
     ) -> list[tuple[int, dict[int, int]]]:
         """The exchanges that can be undone, counted; markers of the others are marked in `misnamed`."""
-        back, masks = [], {}
+        back: list[tuple[int, dict[int, int]]] = []
+        masks: dict[tuple[str, ...], np.ndarray] = {}
         for frame, chain in exchanged:
             if set(chain) != set(chain.values()):
                 misnamed[frame, list(chain)] = True

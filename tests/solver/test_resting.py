@@ -95,3 +95,17 @@ def test_neutral_places_of_markers_that_keep_still_stay_what_they_are(face, layo
     take = rest_and_smile(face, layout, 0.3, 0)
     short = neutral_places(take, layout.face_labels, 1.0)[1]
     np.testing.assert_array_equal(steady_places(take, layout.face_labels, 1.0), short)
+
+
+@pytest.mark.parametrize("label", ["LIPUM", "HEADF"])
+def test_one_wrong_marker_in_one_frame_does_not_choose_the_neutral_frame(mini, face, layout, label):
+    from signface.takes.cleaning import cleaning_stages
+    from signface.takes.stages import run
+
+    take = read_take(mini.takes[2].path)
+    clean = resting_time(run(take, *cleaning_stages(layout.labels)), face, layout)
+    for by in ((300, 200, 100), (60, 0, 0), (0, 0, -900)):
+        positions = take.positions.copy()
+        positions[500, take.labels.index(label)] += by
+        spoiled = run(take.changed("spoiled", positions=positions), *cleaning_stages(layout.labels))
+        assert resting_time(spoiled, face, layout) == clean

@@ -9,6 +9,7 @@ from signface.cli.main import main
 from signface.descriptors import Descriptors
 from signface.descriptors_files import write_weights
 from signface.takes.formats.c3d import write_c3d
+from signface.takes.reading import read_take
 from signface.takes.take import Take
 from tests.fixtures.takes_files import moving_face, with_gaps
 
@@ -55,6 +56,26 @@ def test_info_recognises_the_layout_and_its_head_markers(prefix, face, tmp_path,
     assert content["face_markers"] == len(layout.face_labels)
     assert content["head_markers"] == list(layout.head_labels[1:])
     assert content["missing"] == [layout.head_labels[0]]
+
+
+def test_info_names_ghosts_and_swapped_markers_and_when(mini, tmp_path, capsys):
+    take = read_take(mini.takes[2].path)
+    positions = take.positions.copy()
+    lip, left, right = (take.labels.index(label) for label in ("LIPUM", "HEADL", "HEADR"))
+    positions[500, lip] += (300, 200, 100)
+    positions[600:700, [left, right]] = positions[600:700, [right, left]]
+    write_c3d(take.changed("spoiled", positions=positions), tmp_path / "take.c3d")
+    assert main(["take", "info", str(tmp_path / "take.c3d")]) == 0
+    said = capsys.readouterr().out
+    assert "LIPUM a ghost at 2.500 s (left out)" in said
+    assert "HEADL and HEADR swapped 3.000 to 3.495 s (swapped back)" in said
+    assert main(["take", "info", "--json", str(tmp_path / "take.c3d"), str(mini.takes[2].path)]) == 0
+    spoiled, clean = json.loads(capsys.readouterr().out)
+    assert [(one["kind"], one["markers"]) for one in spoiled["wrong_markers"]] == [
+        ("ghost", ["LIPUM"]),
+        ("swapped", ["HEADL", "HEADR"]),
+    ]
+    assert clean["wrong_markers"] == []
 
 
 def test_the_unit_can_be_given(tmp_path, capsys):

@@ -11,6 +11,7 @@ from signface.takes.formats.c3d import open_c3d, write_c3d
 from signface.takes.formats.table import write_table
 from signface.takes.gaps import GapFiller, fill_gaps
 from signface.takes.labels import Renaming, rename_to
+from signface.takes.marker_check import MarkerCheck
 from signface.takes.reading import open_recording, read_take
 from signface.takes.recording import pieces
 from signface.takes.stabilisation import HeadMotion, NeutralAlignment, align_neutral, stabilise
@@ -27,11 +28,14 @@ def layout(face):
 
 @pytest.fixture(scope="module")
 def gappy(mini, layout):
-    """A take of 600 frames with gaps of all kinds, and a head that is out of sight for a while."""
+    """A take of 600 frames with gaps of all kinds, wrong markers, and a head that is out of sight for a while."""
     take = read_take(mini.takes[1].path)
     positions = take.positions[:600].copy()
     for marker, begin, end in ((3, 0, 40), (5, 195, 203), (7, 330, 400), (11, 420, 560), (20, 570, 600)):
         positions[begin:end, marker] = np.nan
+    positions[100:160, [0, 2]] = positions[100:160, [2, 0]]  # swapped
+    positions[[222, 223, 584], 12] += (9.0, 40.0, 9.0)  # ghosts
+    positions[350:420, 14] = positions[350, 14]  # frozen
     heads = [take.labels.index(label) for label in layout.head_labels if label in take.labels]
     positions[250:270, heads[:4]] = np.nan  # bridged
     positions[450:530, heads] = np.nan  # blind for longer than is bridged
@@ -43,6 +47,7 @@ def stages(face, layout):
     """One of each, unlearnt, by name."""
     return {
         "names": Renaming(layout.labels),
+        "check": MarkerCheck(),
         "gaps": GapFiller(),
         "butterworth": Lowpass(),
         "raised-sine": Lowpass(method="raised-sine"),
@@ -52,7 +57,7 @@ def stages(face, layout):
     }
 
 
-STAGES = ["names", "gaps", "butterworth", "raised-sine", "no filter", "alignment", "head motion"]
+STAGES = ["names", "check", "gaps", "butterworth", "raised-sine", "no filter", "alignment", "head motion"]
 
 
 def in_pieces(recording, length):
@@ -164,7 +169,7 @@ def test_spread_frames_are_those_of_the_whole(step, gappy, layout):
 
 
 def test_asking_twice_counts_once(stages, gappy):
-    for name in ("gaps", "head motion"):
+    for name in ("check", "gaps", "head motion"):
         staged = View(gappy).through(stages[name]).recording
         staged.frames(0, gappy.n_frames)
         history = staged.history
