@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 
 from signface.annotation import annotate
+from signface.datasets import mini_take
 from signface.elan.document import read_document, tier_rows
 from signface.elan.writing import write_eaf
 from signface.label.persistence import load_model
 from signface.settings.eaf import EafOptions
 from signface.settings.solve import SolveSettings
 from signface.solver.solving import solve
-from signface.takes.reading import read_take
 from signface.trust import residual_words, untrusted, worst
 
 
 @pytest.fixture(scope="module")
-def take(mini):
-    return read_take(mini.takes[2].path)
+def take():
+    return mini_take("M2_EU_04")
 
 
 @pytest.fixture(scope="module")

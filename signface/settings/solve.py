@@ -87,8 +87,9 @@ class SolveSettings(Settings):
     )
     check_markers: bool = option(
         True,
-        help="look for ghosts, swapped and frozen markers before the solve, and mend them or leave them out",
+        help="do not look for ghosts, swapped and frozen markers before the solve",
         kind=bool,
+        flag="--keep-wrong-markers",
     )
     short_gap_s: float | None = number(
         help="longest gap that a spline fills (default: 0.05 s)", flag="--short-gap", metavar="SECONDS"

@@ -98,11 +98,12 @@ def test_neutral_places_of_markers_that_keep_still_stay_what_they_are(face, layo
 
 
 @pytest.mark.parametrize("label", ["LIPUM", "HEADF"])
-def test_one_wrong_marker_in_one_frame_does_not_choose_the_neutral_frame(mini, face, layout, label):
+def test_one_wrong_marker_in_one_frame_does_not_choose_the_neutral_frame(face, layout, label):
+    from signface.datasets import mini_take
     from signface.takes.cleaning import cleaning_stages
     from signface.takes.stages import run
 
-    take = read_take(mini.takes[2].path)
+    take = mini_take("M2_EU_04")
     clean = resting_time(run(take, *cleaning_stages(layout.labels)), face, layout)
     for by in ((300, 200, 100), (60, 0, 0), (0, 0, -900)):
         positions = take.positions.copy()
