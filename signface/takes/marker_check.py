@@ -12,14 +12,14 @@ BUHMAP, GFE) two have findings, a point of the jaw that jumps and three points t
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from signface.descriptors import CHECKED, NOTHING_WRONG, TOO_FEW
 from signface.frames import runs
-from signface.takes.misplaced import doubled, ghosts, permuted
+from signface.takes.misplaced import abrupt, doubled, ghosts, permuted
 from signface.takes.stages import Block, Stage, View, run
 from signface.takes.take import Take
 from signface.takes.usual_places import UsualPlaces, usual_places
@@ -42,6 +42,10 @@ FROZEN_S, FROZEN_FRAMES = 0.1, 5
 BY_CHANCE, STILL = 1e-6, 3.0
 #: Recordings in which only longer stillness would say something (s) are not looked at for it.
 LONGEST_FROZEN_S = 5.0
+#: Exchanges with pauses shorter than this are one; each must begin and end with a jump, up to so far beside a frame (s).
+PAUSE_S, EDGE_S = 0.1, 1.0
+#: So many frozen markers at once count only where they are farther than this (mm, times usual) from their usual places.
+SEVERAL, OFF_MM, FAR_OFF = 3, 10.0, 3.0
 #: Where more than this part of the markers would be left out, the frame is left as it is, and named.
 MOST_LEFT_OUT = 1 / 3
 #: Moments of one kind nearer than this (s) are told as one.
@@ -156,7 +160,7 @@ class MarkerCheck(Stage):
         self._labels, self._rate, self._start = recording.labels, recording.rate, recording.start
         self._usual = usual_places(view.spread(SAMPLE_FRAMES).positions)
         self._longest = max(1, int(GHOST_S * self._rate))
-        self.reach = self._longest + 2
+        self.reach = int((EDGE_S + 3 * PAUSE_S + GHOST_S) * self._rate) + 4
         if self._usual is None:
             return
         self._usual = self._usual.renamed(self._wrong_names(self._usual))
@@ -185,6 +189,10 @@ class MarkerCheck(Stage):
         if fitted is None:
             return {}
         away = np.linalg.norm(fitted - usual.middle, axis=1)
+        mirrored = usual.fitted(places * (-1, 1, 1))
+        assert mirrored is not None
+        if np.nanmedian(np.linalg.norm(mirrored - usual.middle, axis=1)) < np.nanmedian(away):
+            return {}  # a mirrored face has them all wrong, and is another matter
         circles = [circle for _, circle in permuted(usual, fitted[None], away[None])]
         wrong = {
             marker: owner
@@ -192,7 +200,6 @@ class MarkerCheck(Stage):
             if set(circle) == set(circle.values())
             for marker, owner in circle.items()
         }
-        # A mirrored face has them all wrong, and is another matter.
         return wrong if len(wrong) <= MOST_LEFT_OUT * np.isfinite(away).sum() else {}
 
     def apply(self, block: Block) -> Block:
@@ -202,15 +209,21 @@ class MarkerCheck(Stage):
         positions = block.positions
         places, away = self._usual.places(positions)
         misnamed = np.zeros(away.shape, dtype=bool)
-        back = self._circles(block, permuted(self._usual, places, away), misnamed)
-        if back:
-            positions = positions.copy()
-            for frame, circle in back:
-                positions[frame, list(circle.values())] = block.positions[frame, list(circle)]
-            frames = sorted({frame for frame, _ in back})
-            places[frames], away[frames] = self._usual.places(positions[frames])
+        back = np.zeros(len(away), dtype=bool)
+        for chain, mask in self._exchanged(places, away):
+            markers, owners = np.array(list(chain)), np.array(list(chain.values()))
+            frames = np.flatnonzero(mask)
+            if set(chain) != set(chain.values()):
+                misnamed[np.ix_(frames, markers)] = True
+                continue
+            positions = positions.copy() if positions is block.positions else positions
+            positions[np.ix_(frames, owners)] = block.positions[np.ix_(frames, markers)]
+            back[frames] = True
+            self._count(block, mask, "swapped", tuple(self._labels[marker] for marker in sorted(chain)), SWAPPED_BACK)
+        if back.any():
+            places[back], away[back] = self._usual.places(positions[back])
         found = {
-            "frozen": self._still(block.positions),
+            "frozen": self._still(block.positions, away),
             "misnamed": misnamed,
             "doubled": doubled(self._usual, places, away),
             "ghost": self._usual.too_far(away) | ghosts(places, away, self._jump, WITH_ALL, self._longest),
@@ -231,25 +244,22 @@ class MarkerCheck(Stage):
         positions[wrong] = np.nan
         return block.changed(positions)
 
-    def _circles(
-        self, block: Block, exchanged: Iterator[tuple[int, dict[int, int]]], misnamed: np.ndarray
-    ) -> list[tuple[int, dict[int, int]]]:
-        """The exchanges that can be undone, counted; markers of the others are marked in `misnamed`."""
-        back: list[tuple[int, dict[int, int]]] = []
-        masks: dict[tuple[str, ...], np.ndarray] = {}
-        for frame, chain in exchanged:
-            if set(chain) != set(chain.values()):
-                misnamed[frame, list(chain)] = True
-                continue
-            back.append((frame, chain))
-            names = tuple(self._labels[marker] for marker in sorted(chain))
-            masks.setdefault(names, np.zeros(len(block.frames), dtype=bool))[frame] = True
-        for names, mask in masks.items():
-            self._count(block, mask, "swapped", names, SWAPPED_BACK)
-        return back
+    def _exchanged(self, places: np.ndarray, away: np.ndarray) -> list[tuple[dict[int, int], np.ndarray]]:
+        """Exchanges of markers, and (F,) bool where each of them holds."""
+        assert self._usual is not None
+        masks: dict[tuple[tuple[int, int], ...], np.ndarray] = {}
+        for frame, chain in permuted(self._usual, places, away):
+            masks.setdefault(tuple(sorted(chain.items())), np.zeros(len(places), dtype=bool))[frame] = True
+        pause, seen = round(PAUSE_S * self._rate), round(EDGE_S * self._rate)
+        return [
+            (dict(chain), abrupt(self._usual, places, dict(chain), mask, pause, seen)) for chain, mask in masks.items()
+        ]
 
-    def _still(self, positions: np.ndarray) -> np.ndarray:
-        """(F, M) bool: markers that do not move at all while most of the others do."""
+    def _still(self, positions: np.ndarray, away: np.ndarray) -> np.ndarray:
+        """(F, M) bool: markers that do not move at all while most of the others do.
+
+        Several at once may be of a head that is held still, or already taken out: those count where they are off.
+        """
         found = np.zeros(positions.shape[:2], dtype=bool)
         if self._frozen >= LONGEST_FROZEN_S * self._rate or len(positions) < 2:
             return found
@@ -261,6 +271,10 @@ class MarkerCheck(Stage):
             for begin, end in runs(equal[:, marker]).tolist():
                 if end - begin + 1 >= self._frozen:
                     found[begin : end + 1, marker] = True
+        several = found.sum(axis=1) >= SEVERAL
+        assert self._usual is not None
+        with np.errstate(invalid="ignore"):
+            found[several] &= away[several] > np.maximum(OFF_MM, FAR_OFF * self._usual.stray)
         return found
 
     def _count(self, block: Block, mask: np.ndarray, kind: str, markers: tuple[str, ...], done: str) -> None:

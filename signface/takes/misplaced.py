@@ -1,6 +1,7 @@
 """Markers in a place that is another's: which, in single frames of places on the head.
 
 - `permuted`: markers under one another's names, and markers where a missing one belongs.
+- `abrupt`: those of them that begin and end with a jump.
 - `doubled`: markers where another one is.
 - `ghosts`: markers where none belongs.
 """
@@ -12,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from signface.frames import runs
+from signface.frames import bridge, runs
 from signface.takes.usual_places import UsualPlaces
 
 #: A marker can be told from its neighbours where the nearest of them is farther than this many times what both stray,
@@ -61,6 +62,40 @@ def permuted(usual: UsualPlaces, places: np.ndarray, away: np.ndarray) -> Iterat
         for chain in _chains(into):
             if _believed(chain, places[frame], middle):
                 yield frame, chain
+
+
+def abrupt(
+    usual: UsualPlaces, places: np.ndarray, chain: dict[int, int], mask: np.ndarray, pause: int, seen: int
+) -> np.ndarray:
+    """(F,) bool: the frames of an exchange that begins and ends with a jump, beside a gap or where the frames do.
+
+    Names are exchanged from one frame to the next. Lips that roll over one another go there by and by.
+
+    Parameters
+    ----------
+    usual : UsualPlaces
+    places : (F, M, 3) array
+    chain : dict of int to int
+        Whose place each marker is in.
+    mask : (F,) array of bool
+        Where.
+    pause : int
+        Pauses of fewer frames are none, and a jump may be as far from the beginning or the end.
+    seen : int
+        Frames up to which a beginning or end counts.
+    """
+    held = bridge(mask, pause)
+    markers, owners = list(chain), list(chain.values())
+    way = np.linalg.norm(usual.middle[owners] - usual.middle[markers], axis=1)
+    steps = np.linalg.norm(np.diff(places[:, markers], axis=0), axis=2)
+    with np.errstate(invalid="ignore"):
+        jumps = (~(steps < ON_THE_WAY * way)).any(axis=1)  # also where one comes or goes
+    for begin, end in runs(held).tolist():
+        if begin > 0 and not jumps[max(0, begin - 1 - pause) : begin + pause].any():
+            held[begin : min(end, begin + seen)] = False
+        if end < len(held) and not jumps[max(0, end - 1 - pause) : end + pause].any():
+            held[max(begin, end - seen) : end] = False
+    return held
 
 
 def _nearest(usual: UsualPlaces) -> np.ndarray:

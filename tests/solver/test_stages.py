@@ -102,6 +102,7 @@ def test_a_preparation_is_its_stages_one_after_the_other(mini, face, layout):
     np.testing.assert_allclose(block.positions, displacements, rtol=0, atol=1e-9)
     np.testing.assert_allclose(block.head, head, rtol=0, atol=1e-9)
     assert [type(stage).__name__ for stage in preparation.stages if not stage.causal] == [
+        "MarkerCheck",
         "GapFiller",
         "Lowpass",
         "HeadMotion",

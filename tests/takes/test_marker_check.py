@@ -169,6 +169,37 @@ def test_a_face_that_does_not_move_is_not_frozen(mini):
     assert check_markers(still)[1] == []
 
 
+def test_markers_of_a_head_that_is_held_still_are_not_frozen_and_filled_ones_are(take, face):
+    heads = [label for label in take.labels if label.startswith("HEAD")]
+
+    layout = read_layout("default-40", face)
+    rest = np.repeat(layout.points(face, layout.labels)[None], 600, axis=0)
+    skin = len(layout.face_labels)
+    rest[:, :skin] += np.random.default_rng(0).normal(size=(600, skin, 3)) * 0.2
+    assert check_markers(Take(rest, layout.labels, 200.0))[1] == []
+    rising = np.linspace(0, 60, take.n_frames)[:, None] * (0.0, 1.0, 0.0)
+    positions = take.positions + rising[:, None]
+    columns = [take.labels.index(label) for label in heads[:3]]
+    positions[STRETCH, columns] = positions[400, columns]
+    found = check_markers(Take(positions, take.labels, take.rate))[1]
+    assert {one.markers[0] for one in found if one.kind == "frozen"} == set(heads[:3])
+
+
+def test_lips_that_roll_over_one_another_are_not_swapped(take):
+    upper, lower = (take.labels.index(label) for label in ("LIPUM", "LIPDM"))
+    share = np.clip(np.minimum(np.arange(take.n_frames) - 400, 700 - np.arange(take.n_frames)) / 20, 0, 1)[:, None]
+    positions = take.positions.copy()
+    across = take.positions[:, lower] - take.positions[:, upper]
+    positions[:, upper] += share * across + share * (1 - share) * (0.0, 0.0, 8.0)  # before the other
+    positions[:, lower] -= share * across
+    assert check_markers(Take(positions, take.labels, take.rate))[1] == []
+
+
+def test_a_mirrored_face_is_not_a_face_of_swapped_markers(take, known):
+    mirrored = Take(take.positions * (1, 1, -1), take.labels, take.rate)
+    assert check_markers(mirrored, known)[1] == []
+
+
 @pytest.mark.parametrize("frames", [1, 2, 3])
 @pytest.mark.parametrize("markers", [1, 4, 46])
 def test_short_takes_of_few_markers_pass(take, frames, markers):
