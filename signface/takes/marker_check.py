@@ -42,7 +42,7 @@ FROZEN_S, FROZEN_FRAMES = 0.1, 5
 BY_CHANCE, STILL = 1e-6, 3.0
 #: Recordings in which only longer stillness would say something (s) are not looked at for it.
 LONGEST_FROZEN_S = 5.0
-#: Exchanges with pauses shorter than this are one; each must begin and end with a jump, up to so far beside a frame (s).
+#: Exchanges with pauses shorter than this are one; each begins and ends with a jump, up to so far beside a frame (s).
 PAUSE_S, EDGE_S = 0.1, 1.0
 #: So many frozen markers at once count only where they are farther than this (mm, times usual) from their usual places.
 SEVERAL, OFF_MM, FAR_OFF = 3, 10.0, 3.0
