@@ -62,7 +62,13 @@ class Clause(Content):
     model: str
 
 
-def find_clause(recording: Recording | Descriptors, model: TrainedModel, *, signer: Signer | None = None) -> Clause:
+def find_clause(
+    recording: Recording | Descriptors,
+    model: TrainedModel,
+    *,
+    signer: Signer | None = None,
+    settings: SolveSettings | None = None,
+) -> Clause:
     """The segments that a model finds in a recording, which is solved as the model's own takes were.
 
     Parameters
@@ -74,6 +80,9 @@ def find_clause(recording: Recording | Descriptors, model: TrainedModel, *, sign
         Of any tier.
     signer : Signer, optional
         Whose level is used where it is of the model's columns.
+    settings : SolveSettings, optional
+        Whose markers, from when to when and where in the film: only that counts of them
+        (`signface.settings.solve.OF_THE_TAKE`), and only for a recording that is not solved yet.
 
     Raises
     ------
@@ -90,7 +99,7 @@ def find_clause(recording: Recording | Descriptors, model: TrainedModel, *, sign
     from signface.settings.solve import SolveSettings
     from signface.solver.solving import solve
 
-    own = SolveSettings.from_dict(model.card.solve) if model.card.solve else None
+    own = SolveSettings.from_dict(model.card.solve or {}).for_take_of(settings)
     descriptors = solve(recording, settings=own, signer=signer)
     level = None if signer is None else signer.level
     if level is not None and not set(model.card.bases) <= set(level.names):
@@ -350,8 +359,7 @@ def annotate(
         if "intensity" in thresholds and "intensity" not in segments.table and model.card.tier == "affect":
             segments = find_intensities(descriptors, segments, thresholds)
     found = tuple(
-        one if isinstance(one, Clause) else find_clause(_fitting(one, descriptors, recording), one, signer=signer)
-        for one in clauses
+        one if isinstance(one, Clause) else _clause_of(one, descriptors, recording, signer, settings) for one in clauses
     )
     taken, named = {model.card.tier, *(events or {})}, []
     for one in found:
@@ -360,9 +368,17 @@ def annotate(
     return Annotation(descriptors, segments, model.name, events, signer, model.card, tuple(named), unseen)
 
 
-def _fitting(model: TrainedModel, descriptors: Descriptors, recording: Recording | Descriptors) -> Any:
-    """The descriptors where they have the model's columns, or else the recording, to be solved as the model wants."""
-    return descriptors if set(model.card.bases) <= set(descriptors.names) else recording
+def _clause_of(
+    model: TrainedModel,
+    descriptors: Descriptors,
+    recording: Recording | Descriptors,
+    signer: Signer,
+    settings: SolveSettings | None,
+) -> Clause:
+    """From the descriptors where they have the model's columns, or else the recording, solved as the model wants."""
+    if set(model.card.bases) <= set(descriptors.names):
+        return find_clause(descriptors, model, signer=signer)
+    return find_clause(recording, model, signer=signer, settings=settings)
 
 
 def median_known(values: np.ndarray) -> float | None:

@@ -6,10 +6,10 @@ import argparse
 import contextlib
 import sys
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +25,7 @@ from signface.cli.options import (
 )
 from signface.cli.threads import one_thread_for_matrices
 from signface.errors import SignfaceError, SignfaceWarning
+from signface.marker_names import SeveralSigners
 from signface.progress import progress
 from signface.settings.choices import BY_SIGNER
 from signface.settings.eaf import EafOptions
@@ -40,6 +41,9 @@ if TYPE_CHECKING:
 EXAMPLE = """  signface annotate take.c3d -o take.eaf
   signface annotate recordings/*.c3d -o annotated/ --signer S1
   signface annotate take.c3d --into corrected.eaf --channels
+  signface annotate dialogue.c3d -o dialogue.eaf
+  signface annotate dialogue.c3d --subject Anna --from 0:10 --to 1:30
+  signface annotate phone.csv --timecode 10:23:11:00@25 --video film.mp4
   signface annotate openface/*.csv -o annotated/ --signer S1 --channels --clause lse-questions"""
 
 
@@ -95,33 +99,47 @@ def run(arguments: argparse.Namespace) -> int:
 
         channels = read_channels(options.channels)
     signer, settings = signer_from(arguments), settings_from(arguments, SolveSettings)
+    signer = signer if signer.name or not settings.subject else replace(signer, name=settings.subject)
     _warn_of_affect(takes, arguments.classifier)
     _import_shared()
     failed = 0
     with ThreadPoolExecutor(1) as beside:
         model = beside.submit(_load_model, arguments.classifier)
         face, layout = read_face_and_layout(settings)
-        known: dict[Path, Descriptors] = {}
-        if len(takes) > 1 and signer.level is None:
-            signer, known = _of_all(takes, settings, signer, wanted=model.result().card.normalise in BY_SIGNER)
-        from signface.label.persistence import load_model
 
-        further = [_Further(load_model(name, quickly=True), takes, signer) for name in arguments.clause]
+        @cache
+        def whose(subject: str | None) -> _Whose:
+            """What is known of the one signer, or of one of those whom the takes show."""
+            named = signer if subject is None else replace(signer, name=subject)
+            its = settings if subject is None else settings.changed(subject=subject)
+            return _Whose(takes, named, its, model.result, arguments.clause)
+
+        def annotated(take: Path, subject: str | None = None) -> Annotation:
+            """What is found in a take of one signer."""
+            one = whose(subject)
+            descriptors = one.known.get(take) or solve(
+                open_recording(take, **one.settings.reading), face, layout, settings=one.settings, signer=one.signer
+            )
+            clauses = [further.found(take) for further in one.further]
+            return annotate(descriptors, model.result(), signer=one.signer, channels=channels, clauses=clauses)
+
         for take, file in progress(list(zip(takes, files, strict=True)), "annotating"):
             path, into = (file, None) if arguments.into is None else (None, file)
             try:
-                descriptors = known.get(take) or solve(
-                    open_recording(take, **settings.reading), face, layout, settings=settings, signer=signer
-                )
-                clauses = [one.found(take) for one in further]
-                result = annotate(descriptors, model.result(), signer=signer, channels=channels, clauses=clauses)
+                try:
+                    results = [annotated(take)]
+                except SeveralSigners as several:  # a dialogue: each with tiers of their own
+                    results = [annotated(take, one) for one in _chosen(several, arguments.signer)]
+                from signface.elan.tiers import clean_name
                 from signface.elan.writing import write_eaf  # imported beside the solve, by _load_model
 
-                write_eaf(result, path, into=into, options=options, video=arguments.video, replace=arguments.replace)
-                if arguments.figure:
-                    save_picture(result, face, file.with_suffix(".png"))
-                print(f"{file}: {result}")
-                warn_of_jitter(result.descriptors, result.jitter)
+                write_eaf(results, path, into=into, options=options, video=arguments.video, replace=arguments.replace)
+                for result in results:
+                    of = f".{clean_name(result.signer.name)}" if len(results) > 1 else ""
+                    if arguments.figure:
+                        save_picture(result, face, file.with_suffix(f"{of}.png"))
+                    print(f"{file}{f' ({result.signer.name})' if of else ''}: {result}")
+                    warn_of_jitter(result.descriptors, result.jitter)
             except SignfaceError as error:
                 if len(takes) == 1 or error is model.exception():
                     raise
@@ -191,11 +209,40 @@ def _of_all(
     return signer, {take: one for take, one in zip(takes, solved, strict=True) if one is not None}
 
 
+def _chosen(several: SeveralSigners, signer: str) -> tuple[str, ...]:
+    """The signers of a take who are annotated: the one whom `--signer` names, or all of them."""
+    if (signer and signer not in several.signers) or "" in several.signers:
+        raise several
+    return (signer,) if signer else several.signers
+
+
+class _Whose:
+    """What is known of a signer over all takes: level, takes solved, and the further models for them."""
+
+    def __init__(
+        self,
+        takes: list[Path],
+        signer: Signer,
+        settings: SolveSettings,
+        model: Callable[[], TrainedModel],
+        clauses: list[str],
+    ) -> None:
+        from signface.label.persistence import load_model
+
+        self.signer, self.settings = signer, settings
+        self.known: dict[Path, Descriptors] = {}
+        if len(takes) > 1 and signer.level is None:
+            wanted = model().card.normalise in BY_SIGNER
+            self.signer, self.known = _of_all(takes, settings, signer, wanted=wanted)
+        self.further = [_Further(load_model(name, quickly=True), takes, self.signer, settings) for name in clauses]
+
+
 class _Further:
     """A model of `--clause`, with the takes solved and the signer's level as its own takes were."""
 
-    def __init__(self, model: TrainedModel, takes: list[Path], signer: Signer) -> None:
-        self.model, self.settings = model, SolveSettings.from_dict(model.card.solve)
+    def __init__(self, model: TrainedModel, takes: list[Path], signer: Signer, settings: SolveSettings) -> None:
+        self.model = model
+        self.settings = SolveSettings.from_dict(model.card.solve).for_take_of(settings)
         self.signer = signer
         self.known: dict[Path, Descriptors] = {}
         fits = signer.level is not None and set(model.card.bases) <= set(signer.level.names)
@@ -207,8 +254,10 @@ class _Further:
         from signface.annotation import find_clause
         from signface.takes.reading import open_recording
 
-        recording = self.known.get(take) or open_recording(take, **self.settings.reading)
-        return find_clause(recording, self.model, signer=self.signer)
+        if take in self.known:
+            return find_clause(self.known[take], self.model, signer=self.signer)
+        recording = open_recording(take, **self.settings.reading)
+        return find_clause(recording, self.model, signer=self.signer, settings=self.settings)
 
 
 def _import_shared() -> None:

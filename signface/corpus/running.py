@@ -189,7 +189,8 @@ def plan_jobs(
 
 def _solved_as(jobs: list[Job], card: Card) -> list[Job]:
     """The jobs, their takes solved as those that a model was trained on."""
-    recipe = make_recipe(SolveSettings.from_dict(card.solve))
+    settings = next((job.recipe.settings for job in jobs), None)
+    recipe = make_recipe(SolveSettings.from_dict(card.solve).for_take_of(settings))
     known: dict[tuple[str, str | None], Recipe] = {}
     return [replace(job, recipe=recipe_of(job.entry, recipe, known)) for job in jobs]
 

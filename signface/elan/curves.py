@@ -2,6 +2,7 @@
 
 - `write_curves`: the csv, from the table of `signface.segmentation.curves.curves_table`.
 - `write_tsconf`: names, units, ranges and colours of the curves, in ELAN's own format.
+- `joined_curves`: those of several signers as one table.
 - `panels`: which curves are drawn together (`preferences.write_preferences`).
 
 How ELAN reads the csv (`CSVReader` in its sources) decides its form: lines starting with `#` are skipped, any other
@@ -15,7 +16,8 @@ from __future__ import annotations
 import contextlib
 import datetime
 import warnings
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from urllib.parse import unquote
@@ -161,7 +163,7 @@ def write_tsconf(
     source.set("time-column", "0")
     etree.SubElement(source, "property", key="provider", value=PROVIDER)
     for column, name in enumerate(table.columns[1:], start=1):
-        curve = CURVES.get(name) or _other_curve(name, column)
+        curve = _curve(name, column, table.columns)
         low, high = curve.span or _span(table[name].to_numpy(float))
         track = etree.SubElement(source, "track", name=curve.name, derivative="0")
         etree.SubElement(track, "property", key="detect-range", value="false")
@@ -199,11 +201,12 @@ def panels(curves: str | PathLike[str]) -> dict[int, list[str]]:
         The curves cannot be read.
     """
     drawn: dict[int, list[str]] = {}
-    for column, name in enumerate(_read_curves(curves, nrows=0).columns[1:], start=1):
-        curve = CURVES.get(name) or _other_curve(name, column)
+    columns = _read_curves(curves, nrows=0).columns
+    for column, name in enumerate(columns[1:], start=1):
+        curve = _curve(name, column, columns)
         panel = curve.panel
-        if name not in CURVES and len(drawn.get(panel, ())) >= TRACKS:
-            panel = LOWER
+        if name.partition("@")[0] not in CURVES and len(drawn.get(panel, ())) >= TRACKS:
+            panel += LOWER - UPPER
         drawn.setdefault(panel, []).append(curve.name)
     return dict(sorted(drawn.items()))
 
@@ -213,6 +216,35 @@ def _read_curves(curves: str | PathLike[str], nrows: int | None = None) -> pd.Da
         return pd.read_csv(curves, nrows=nrows)
     except (OSError, ValueError) as error:
         raise SignfaceError("cannot be read as a file of curves", file=curves) from error
+
+
+def _curve(name: str, column: int, columns: Sequence[str]) -> Curve:
+    """How a column is drawn; `NAME@SIGNER` on panels of that signer's own."""
+    bare, _, signer = name.partition("@")
+    curve = CURVES.get(bare) or _other_curve(bare, column)
+    if not signer:
+        return curve
+    signers = list(dict.fromkeys(other.partition("@")[2] for other in columns[1:]))
+    below = signers.index(signer) * max(known.panel for known in CURVES.values())
+    return replace(
+        curve, name=f"{curve.name} {signer}", description=f"{curve.description} ({signer})", panel=curve.panel + below
+    )
+
+
+def joined_curves(curves: Sequence[pd.DataFrame], signers: Sequence[str]) -> pd.DataFrame:
+    """The curves of the signers of one take in one table, whose columns are called `NAME@SIGNER`.
+
+    Examples
+    --------
+    >>> one = pd.DataFrame({"time_s": [0.0], "confidence": [0.5]})
+    >>> joined_curves([one, one], ["Anna", "Ben"]).columns.tolist()
+    ['time_s', 'confidence@Anna', 'confidence@Ben']
+    """
+    named = [
+        table.assign(time_s=table["time_s"].round(2)).set_index("time_s").add_suffix(f"@{signer}")
+        for table, signer in zip(curves, signers, strict=True)
+    ]
+    return pd.concat(named, axis=1).sort_index().rename_axis("time_s").reset_index()
 
 
 def _other_curve(name: str, column: int) -> Curve:

@@ -13,6 +13,7 @@ import json
 import tempfile
 import uuid
 from collections.abc import Mapping as MappingABC
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from os import PathLike
@@ -24,8 +25,8 @@ from lxml import etree
 
 from signface.channels.events import ChannelEvents
 from signface.content import Content
-from signface.elan.channels import channel_tiers
 from signface.elan.checking import check_document
+from signface.elan.contents import contents_of
 from signface.elan.curves import write_curves, write_tsconf
 from signface.elan.document import (
     PROPERTY_PREFIX,
@@ -45,10 +46,10 @@ from signface.elan.links import curve_files, link_curves, link_media, warn_of_cu
 from signface.elan.mapping import read_mapping
 from signface.elan.merging import put_tiers
 from signface.elan.preferences import write_preferences
-from signface.elan.tiers import Tier, doubtful_tier, label_tier, xml_text
+from signface.elan.tiers import Tier, xml_text
 from signface.elan.upgrade import is_before_28, upgrade
 from signface.errors import SignfaceError
-from signface.label.vocabulary import AFFECT, Vocabulary
+from signface.label.vocabulary import Vocabulary
 from signface.segmentation.segments import Segments
 from signface.settings.eaf import EafOptions
 from signface.signer import Signer
@@ -88,7 +89,7 @@ class Results(Protocol):
 
 
 def write_eaf(
-    annotation: Results | Segments,
+    annotation: Results | Segments | Sequence[Results],
     path: str | PathLike[str] | None = None,
     *,
     into: str | PathLike[str] | None = None,
@@ -112,8 +113,9 @@ def write_eaf(
 
     Parameters
     ----------
-    annotation : Annotation or Segments
-        Times in seconds from the beginning of the video (a take's `start` is already in them). Segments alone have
+    annotation : Annotation, Segments or sequence of Annotation
+        Several are those of the signers of one take, each with tiers and curves of their own. Times in seconds from the
+        beginning of the video (a take's `start` is already in them). Segments alone have
         neither channels nor curves.
     path : path, optional
         The `.eaf` to write: this or `into`.
@@ -186,7 +188,7 @@ def write_eaf(
 
 
 def prepare(
-    annotation: Results | Segments,
+    annotation: Results | Segments | Sequence[Results],
     path: str | PathLike[str] | None = None,
     *,
     into: str | PathLike[str] | None = None,
@@ -210,29 +212,10 @@ def prepare(
         root.set("AUTHOR", xml_text(options.author))
     else:
         root, old = _read_upgraded(file)
-    curves, tiers, facts = None, [], dict(properties or {})
-    if isinstance(annotation, Segments):
-        segments, signer = annotation, signer or ""
-        tier, vocabulary = tier or "affect", vocabulary or AFFECT
-    else:
-        tier, vocabulary = tier or annotation.tier, vocabulary or annotation.vocabulary
-        segments, signer = annotation.segments, annotation.signer.name if signer is None else signer
-        curves = annotation.curves if options.curves else None
-        facts = {**annotation.facts, **facts}
-        others = (event for event in (annotation.channels or {}).values() if event.channel != tier)
-        tiers = channel_tiers(others, signer)
-        tiers += [
-            label_tier(one.segments, signer, channel=one.tier, vocabulary=one.vocabulary)
-            for one in getattr(annotation, "clauses", ())
-        ]
-    untrusted = getattr(annotation, "untrusted", ())
-    if options.doubtful is not None or untrusted:
-        below = options.doubtful
-        doubtful = doubtful_tier(
-            segments, signer, below=below, untrusted=untrusted, channel=tier, vocabulary=vocabulary
-        )
-        tiers = [doubtful, *tiers] if below is not None or doubtful.values else tiers
-    all_tiers = (label_tier(segments, signer, channel=tier, vocabulary=vocabulary), *tiers)
+    all_tiers, curves, facts, segments = contents_of(
+        annotation, options, signer=signer, tier=tier, vocabulary=vocabulary
+    )
+    facts |= properties or {}
     rules = {} if options.mapping is None else read_mapping(options.mapping)
     links: tuple[Path, ...] = ()
     if curves is not None:
