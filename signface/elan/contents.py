@@ -1,15 +1,17 @@
 """What goes into a document of what was found in a take: tiers, curves, and facts for the header.
 
+- `Results`: what can be written.
 - `contents_of`: of one signer, or of all signers of a dialogue.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, Protocol
 
 import pandas as pd
 
+from signface.channels.events import ChannelEvents
 from signface.elan.channels import channel_tiers
 from signface.elan.curves import joined_curves
 from signface.elan.tiers import Tier, doubtful_tier, label_tier
@@ -17,9 +19,37 @@ from signface.errors import SignfaceError
 from signface.label.vocabulary import AFFECT, Vocabulary
 from signface.segmentation.segments import Segments
 from signface.settings.eaf import EafOptions
+from signface.signer import Signer
 
-if TYPE_CHECKING:
-    from signface.elan.writing import Results
+
+class Results(Protocol):
+    """What can be written: `signface.annotation.Annotation`, or anything that holds the like.
+
+    `segments` are labelled, with confidence, and with `intensity` where it is known; `channels` are events by channel;
+    `curves` is `time_s` and curves (`signface.segmentation.curves.curves_table`); `signer` names the tiers; `tier` says
+    what the segments are of, `vocabulary` what their labels are, and `facts` what the header of the file says.
+    """
+
+    @property
+    def segments(self) -> Segments: ...
+
+    @property
+    def channels(self) -> Mapping[str, ChannelEvents] | None: ...
+
+    @property
+    def curves(self) -> pd.DataFrame: ...
+
+    @property
+    def signer(self) -> Signer: ...
+
+    @property
+    def tier(self) -> str: ...
+
+    @property
+    def vocabulary(self) -> Vocabulary: ...
+
+    @property
+    def facts(self) -> Mapping[str, str]: ...
 
 
 class Contents(NamedTuple):

@@ -18,15 +18,14 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import pandas as pd
 from lxml import etree
 
-from signface.channels.events import ChannelEvents
 from signface.content import Content
 from signface.elan.checking import check_document
-from signface.elan.contents import contents_of
+from signface.elan.contents import Results, contents_of
 from signface.elan.curves import write_curves, write_tsconf
 from signface.elan.document import (
     PROPERTY_PREFIX,
@@ -52,40 +51,9 @@ from signface.errors import SignfaceError
 from signface.label.vocabulary import Vocabulary
 from signface.segmentation.segments import Segments
 from signface.settings.eaf import EafOptions
-from signface.signer import Signer
 
 if TYPE_CHECKING:
     from pympi.Elan import Eaf
-
-
-class Results(Protocol):
-    """What can be written: `signface.annotation.Annotation`, or anything that holds the like.
-
-    `segments` are labelled, with confidence, and with `intensity` where it is known; `channels` are events by channel;
-    `curves` is `time_s` and curves (`signface.segmentation.curves.curves_table`); `signer` names the tiers; `tier` says
-    what the segments are of, `vocabulary` what their labels are, and `facts` what the header of the file says.
-    """
-
-    @property
-    def segments(self) -> Segments: ...
-
-    @property
-    def channels(self) -> MappingABC[str, ChannelEvents] | None: ...
-
-    @property
-    def curves(self) -> pd.DataFrame: ...
-
-    @property
-    def signer(self) -> Signer: ...
-
-    @property
-    def tier(self) -> str: ...
-
-    @property
-    def vocabulary(self) -> Vocabulary: ...
-
-    @property
-    def facts(self) -> MappingABC[str, str]: ...
 
 
 def write_eaf(
