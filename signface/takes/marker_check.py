@@ -26,7 +26,7 @@ from signface.takes.usual_places import UsualPlaces, usual_places
 
 #: Frames, evenly spaced, from which it is learnt where markers usually are; and stretches of neighbouring frames, from
 #: which it is learnt how far they go from one to the next: so many of so many frames.
-SAMPLE_FRAMES, STRETCHES, STRETCH_FRAMES = 1500, 12, 40
+SAMPLE_FRAMES, STRETCHES, STRETCH_FRAMES = 800, 12, 40
 
 #: Skin does not go faster than this on the head (m/s; lids and lips reach some 0.4), and a marker's place is not known
 #: better than this (mm): who goes farther in a frame has jumped.

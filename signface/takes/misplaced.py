@@ -18,7 +18,7 @@ from signface.takes.usual_places import UsualPlaces
 
 #: A marker can be told from its neighbours where the nearest of them is farther than this many times what both stray,
 #: and than this (mm).
-APART, APART_MM = 4.0, 5.0
+APART, APART_MM = 2.5, 5.0
 #: It may be in a neighbour's place where it has come this part of the way to the nearest one.
 ON_THE_WAY = 0.5
 #: An exchange is one where at least this part of what it would explain at best is explained, and where at most this
@@ -186,7 +186,7 @@ def ghosts(places: np.ndarray, away: np.ndarray, jump: np.ndarray, with_all: flo
             cuts = [begin, *(np.flatnonzero(at[begin : end - 1]) + begin + 1).tolist(), end]
             for first, last in pairwise(cuts):
                 beside = [far[edge] for edge in (first - 1, last) if begin <= edge < end]
-                short = last - first <= (longest if len(beside) == 2 else longest // 4)
+                short = last - first <= (longest if len(beside) == 2 else max(2, longest // 4))
                 if beside and short and np.median(far[first:last]) > max(beside):
                     found[first:last, marker] = True
     return found
