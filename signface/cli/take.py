@@ -24,6 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     info.add_argument("takes", nargs="+", metavar="TAKE", help="a recording, in one of the formats of --formats")
     info.add_argument("--formats", action=_ListFormats, help="list the formats that signface reads, and leave")
     info.add_argument("--unit", help="unit of length of the files (mm, cm, m, in), where they say none or a wrong one")
+    info.add_argument("--subject", metavar="NAME", help="whose markers, of several signers in one recording")
     info.add_argument("--face", default="default", help="face whose layouts are tried (default: the shipped one)")
     info.add_argument("--json", action="store_true", help="print JSON, for scripts")
 
@@ -73,6 +74,12 @@ def _report(file: str, content: dict[str, Any]) -> str:
         if content["layout"] is None:
             lines.append(f"  layout: none of the shipped ones ({content['note']})")
         else:
+            signers = content["signers"]
+            if len(signers) > 1:
+                named = ", ".join(signer or "one without a name" for signer in signers)
+                lines.append(
+                    f"  {len(signers)} signers: {named}; what follows is of one of them, --subject chooses whom"
+                )
             lines.append(f"  layout: {content['layout']}, {content['face_markers']} face markers")
             lines += [f"  but it {content['note']}"] if "note" in content else []
             lines.append(f"  head markers: {_shortened(content['head_markers']) or 'none'}")
@@ -92,7 +99,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     described = []
     for file in arguments.takes:
-        recording = read_recording(file, unit=arguments.unit)
+        recording = read_recording(file, unit=arguments.unit, subject=arguments.subject)
         if isinstance(recording, Take):
             content = describe_take(recording)
             history = content.pop("history")

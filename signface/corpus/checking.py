@@ -133,7 +133,7 @@ def check_corpus(
     problems += _problems_of_names(file, entries)
     signers = frozenset(entry.signer for entry in entries)
     rules = None if mapping is None else as_mapping(mapping)
-    known: dict[tuple[str, str | None], Recipe] = {}
+    known: dict[tuple[str | None, ...], Recipe] = {}
     checks = []
     for number, entry in enumerate(entries):
         try:

@@ -20,6 +20,7 @@ from signface.corpus.store import DescriptorStore
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.files import shipped
+from signface.marker_names import subjects_of
 from signface.settings.solve import SolveSettings
 from signface.signer import Signer
 from signface.takes.selecting import selected
@@ -61,7 +62,12 @@ def read_entry(entry: TakeEntry, recipe: Recipe | None = None) -> Take | Descrip
     from signface.takes.reading import read_recording
 
     settings = None if recipe is None else recipe.settings
-    recording = read_recording(entry.path, **(SolveSettings() if settings is None else settings).reading)
+    settings = SolveSettings() if settings is None else settings
+    recording = read_recording(entry.path, **settings.reading)
+    if not isinstance(recording, Descriptors) and settings.subject is None:
+        there = subjects_of(recording.labels)
+        if len(there) > 1 and entry.signer in there:  # markers that are named after their signers
+            recording = selected(recording, SolveSettings(subject=entry.signer))
     if entry.start_s is None:
         return recording
     return recording.changed(f"start at {entry.start_s:g} s", start=entry.start_s)
@@ -86,7 +92,7 @@ def stored_or_solved(
     return descriptors, True
 
 
-def recipe_of(entry: TakeEntry, recipe: Recipe, known: dict[tuple[str, str | None], Recipe]) -> Recipe:
+def recipe_of(entry: TakeEntry, recipe: Recipe, known: dict[tuple[str | None, ...], Recipe]) -> Recipe:
     """The recipe of a take: its row may name another face or layout. `known` keeps those that were made.
 
     Raises
@@ -94,11 +100,12 @@ def recipe_of(entry: TakeEntry, recipe: Recipe, known: dict[tuple[str, str | Non
     SignfaceError
         There is no such face or layout.
     """
-    if recipe.settings is None or (entry.face is None and entry.layout is None):
+    if recipe.settings is None or (entry.face is None and entry.layout is None and entry.subject is None):
         return recipe
-    names = (entry.face or recipe.settings.face, entry.layout or recipe.settings.layout)
+    settings = recipe.settings
+    names = (entry.face or settings.face, entry.layout or settings.layout, entry.subject or settings.subject)
     if names not in known:
-        known[names] = make_recipe(recipe.settings.changed(face=names[0], layout=names[1]))
+        known[names] = make_recipe(settings.changed(face=names[0], layout=names[1], subject=names[2]))
     return known[names]
 
 

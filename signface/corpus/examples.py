@@ -98,7 +98,7 @@ def solve_corpus(
     warn_of_unknown_rests(entries, corpus.folder, read_as=None if settings is None else settings.read_as)
     store = open_store(corpus.folder)
     recipe = make_recipe(settings)
-    known: dict[tuple[str, str | None], Recipe] = {}
+    known: dict[tuple[str | None, ...], Recipe] = {}
     rules = None if mapping is None else as_mapping(mapping)
     entries, references, vocabulary = _references(entries, tier, vocabulary, sparse, rules)
     origins = [find_origin(entry, corpus.folder, recipe_of(entry, recipe, known)) for entry in entries]

@@ -52,7 +52,7 @@ def corpus_facts(corpus: Corpus, *, settings: SolveSettings | None = None) -> di
         A recording cannot be read.
     """
     recipe = make_recipe(settings)
-    known: dict[tuple[str, str | None], Recipe] = {}
+    known: dict[tuple[str | None, ...], Recipe] = {}
     recordings, origins = [], []
     for entry in corpus:
         if entry.annotation is None:

@@ -60,7 +60,7 @@ def learn_signers(
     ['M1', 'M2']
     """
     store, recipe = open_store(corpus.folder), make_recipe(settings)
-    known: dict[tuple[str, str | None], Recipe] = {}
+    known: dict[tuple[str | None, ...], Recipe] = {}
     errors: dict[str, SignfaceError] = {}
     by_signer: dict[str, list[Descriptors]] = {}
     signers: dict[str, Signer] = {}
@@ -85,15 +85,16 @@ def learn_signers(
         yield signers[name].with_level(by_signer[name])
 
 
-def _rest(entries: list[TakeEntry], recipe: Recipe, known: dict[tuple[str, str | None], Recipe]) -> SignerRest | None:
+def _rest(entries: list[TakeEntry], recipe: Recipe, known: dict[tuple[str | None, ...], Recipe]) -> SignerRest | None:
     """The rest of a signer whose takes are of landmarks; None where they are of markers or hold weights."""
     recordings: list[Take] = []
     layout = None
     for entry in entries:
         with contextlib.suppress(SignfaceError):  # said when it is solved
-            recording = read_entry(entry, recipe)
+            own = recipe_of(entry, recipe, known)
+            recording = read_entry(entry, own)
             if isinstance(recording, Take):
-                found = layout_for(recipe_of(entry, recipe, known), recording.labels)
+                found = layout_for(own, recording.labels)
                 if found.of_landmarks:
                     recordings.append(recording)
                     layout = found

@@ -6,7 +6,7 @@
 - `TakeEntry`, `Corpus`: a row, and all of them with filters by kind and by signer.
 
 The columns are `take`, `signer`, `kind` (required) and `annotation`, `neutral_s`, `video`, `start_s`, `intensity`,
-`face`, `layout`, `sentence` (optional). Paths are relative to the csv. Other columns are left alone.
+`face`, `layout`, `sentence`, `subject` (optional). Paths are relative to the csv. Other columns are left alone.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from signface.files import whole_file
 
 MANIFEST = "takes.csv"
 REQUIRED = ("take", "signer", "kind")
-OPTIONAL = ("annotation", "neutral_s", "video", "start_s", "intensity", "face", "layout", "sentence")
+OPTIONAL = ("annotation", "neutral_s", "video", "start_s", "intensity", "face", "layout", "sentence", "subject")
 INTENSITIES = (1, 2, 3)
 
 #: How many problems one error spells out; the rest are counted.
@@ -59,6 +59,9 @@ class TakeEntry:
         A shipped name or a path, where this take needs others than the default.
     sentence : str, optional
         What is signed: takes of one sentence by one signer are never trained on and tested at once.
+    subject : str, optional
+        Whose markers in the recording, where it holds those of several; then it may have a row for each. The signer's
+        where the markers are named after them.
     """
 
     path: Path
@@ -72,6 +75,7 @@ class TakeEntry:
     face: str | None = None
     layout: str | None = None
     sentence: str | None = None
+    subject: str | None = None
 
     @property
     def name(self) -> str:
@@ -233,7 +237,7 @@ def read_rows(file: Path) -> tuple[list[TakeEntry], list[str]]:
     if not rows:
         problems.append("it has no take")
     takes = []
-    first_line: dict[Path, int] = {}
+    first_line: dict[tuple[Path, str | None], int] = {}
     for line, cells in rows:
         if len(cells) > len(header):
             problems.append(f"line {line}: has {len(cells)} cells for {len(header)} columns")
@@ -242,7 +246,7 @@ def read_rows(file: Path) -> tuple[list[TakeEntry], list[str]]:
         problems.extend(f"line {line}: {problem}" for problem in wrong)
         if take is None:
             continue
-        recording = take.path.resolve()
+        recording = (take.path.resolve(), take.subject)
         if recording in first_line:
             problems.append(f"line {line}: the take {row['take']} is already on line {first_line[recording]}")
             continue
@@ -334,6 +338,7 @@ def _read_row(row: dict[str, str], folder: Path) -> tuple[TakeEntry | None, list
         face=name_or_path("face"),
         layout=name_or_path("layout"),
         sentence=row.get("sentence") or None,
+        subject=row.get("subject") or None,
     )
     return take, problems
 
@@ -382,4 +387,5 @@ def _cells(take: TakeEntry, folder: Path) -> dict[str, str]:
         "face": take.face or "",
         "layout": take.layout or "",
         "sentence": take.sentence or "",
+        "subject": take.subject or "",
     }

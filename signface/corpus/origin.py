@@ -184,13 +184,16 @@ def find_origin(entry: TakeEntry, folder: Path, recipe: Recipe) -> Origin:
 def take_name(entry: TakeEntry, folder: Path) -> str:
     """Path of a recording within its corpus, without its ending, with `/`; `..` of one outside becomes `up`.
 
+    `@SUBJECT` follows where the row names one of several.
+
     Examples
     --------
     >>> take_name(TakeEntry(Path("corpus/S1/laugh.c3d"), "S1", "EU"), Path("corpus"))
     'S1/laugh'
     """
     relative = Path(os.path.relpath(entry.path, folder)).with_suffix("")
-    return "/".join("up" if step == os.pardir else step for step in relative.parts)
+    subject = "" if entry.subject is None else f"@{entry.subject.replace('/', '_')}"
+    return "/".join("up" if step == os.pardir else step for step in relative.parts) + subject
 
 
 def content_digest(path: Path) -> str:

@@ -163,7 +163,7 @@ def plan_jobs(
     options_digest = options.content_digest
     model, code = shipped_digest("classifiers", ".skops", classifier), code_digest(*ANNOTATING_CODE)
     folder = Path(os.path.abspath(corpus.folder))
-    known: dict[tuple[str, str | None], Recipe] = {}
+    known: dict[tuple[str | None, ...], Recipe] = {}
     jobs: dict[str, Job] = {}
     signers: dict[str, Signer] = {}
     failed = []
@@ -191,7 +191,7 @@ def _solved_as(jobs: list[Job], card: Card) -> list[Job]:
     """The jobs, their takes solved as those that a model was trained on."""
     settings = next((job.recipe.settings for job in jobs), None)
     recipe = make_recipe(SolveSettings.from_dict(card.solve).for_take_of(settings))
-    known: dict[tuple[str, str | None], Recipe] = {}
+    known: dict[tuple[str | None, ...], Recipe] = {}
     return [replace(job, recipe=recipe_of(job.entry, recipe, known)) for job in jobs]
 
 

@@ -11,9 +11,12 @@ from typing import Any
 from signface.errors import SignfaceError
 from signface.face.layout_files import choose_layout
 from signface.face.model import FaceModel
+from signface.marker_names import SeveralSigners, signers_among
+from signface.settings.solve import SolveSettings
 from signface.solver.layout_fit import check_take
 from signface.takes.labels import match_labels, rename_to
 from signface.takes.marker_check import Finding, check_markers
+from signface.takes.selecting import selected
 from signface.takes.take import Take
 
 
@@ -24,8 +27,9 @@ def recognise_layout(take: Take, face: FaceModel) -> dict[str, Any]:
     -------
     dict
         `layout` (its name, or None where none fits, and then a `note` why), `face_markers` (how many of them the take
-        has), `head_markers` (which), `missing` (markers of the layout that the take has not). A `note` beside a layout
-        says that the markers do not lie where it says.
+        has), `head_markers` (which), `missing` (markers of the layout that the take has not), `signers` (whose markers
+        there are, "" where they have no prefix; the rest is of one of them). A `note` beside a layout says that the
+        markers do not lie where it says.
 
     Examples
     --------
@@ -36,7 +40,14 @@ def recognise_layout(take: Take, face: FaceModel) -> dict[str, Any]:
     try:
         layout = choose_layout(take.labels, face)
     except SignfaceError as error:
-        return {"layout": None, "face_markers": 0, "head_markers": [], "missing": [], "note": error.problem}
+        return {
+            "layout": None,
+            "face_markers": 0,
+            "head_markers": [],
+            "missing": [],
+            "signers": [],
+            "note": error.problem,
+        }
     present = match_labels(take.labels, layout.labels)
     try:
         check_take(take, layout, face)
@@ -48,6 +59,7 @@ def recognise_layout(take: Take, face: FaceModel) -> dict[str, Any]:
         "layout": layout.name,
         "face_markers": sum(1 for label in layout.face_labels if label in present),
         "head_markers": [label for label in layout.head_labels if label in present],
+        "signers": list(signers_among(take.labels, layout.labels)),
         "missing": [label for label in layout.labels if label not in present],
     }
 
@@ -70,6 +82,9 @@ def wrong_markers(take: Take, face: FaceModel) -> list[Finding]:
     try:
         layout = choose_layout(take.labels, face)
         renamed = rename_to(take, layout.labels)
+    except SeveralSigners as several:
+        each = [selected(take, SolveSettings(subject=signer)) for signer in several.signers]
+        return [finding for one in each for finding in wrong_markers(one, face)]
     except SignfaceError:
         return check_markers(take)[1]
     return check_markers(renamed, dict(zip(layout.labels, layout.points(face, layout.labels), strict=True)))[1]

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pandas as pd
 import pytest
 from lxml import etree
 
 from signface.cli.main import main
+from signface.corpus.describing import describe_entry, recipe_of
+from signface.corpus.manifest import read_corpus
+from signface.corpus.origin import make_recipe, take_name
 from signface.datasets import mini_take
 from signface.descriptors_files import read_weights
 from signface.elan.reference import read_reference
@@ -80,6 +85,31 @@ def test_a_chosen_signer_has_the_weights_of_a_file_of_their_own(dialogue, signer
     chosen = solve(open_recording(dialogue / "two.csv"), settings=SolveSettings(subject=signer))
     alone = solve(open_recording(dialogue / f"{signer}.csv"))
     np.testing.assert_allclose(chosen.weights, alone.weights, atol=1e-9)
+
+
+def test_take_info_names_the_signers(dialogue, capsys):
+    assert main(["take", "info", str(dialogue / "two.csv")]) == 0
+    assert "2 signers: Anna, Ben" in capsys.readouterr().out
+    assert main(["take", "info", str(dialogue / "two.csv"), "--subject", "Ben", "--json"]) == 0
+    (said,) = json.loads(capsys.readouterr().out)
+    assert said["signers"] == ["Ben"]
+    assert set(said["missing"]) == set(LACKING["Ben"])
+
+
+@pytest.mark.parametrize("column", ["subject", "signer"])
+def test_a_corpus_has_a_row_for_each_signer_of_a_dialogue(dialogue, tmp_path, column):
+    (tmp_path / "two.csv").write_bytes((dialogue / "two.csv").read_bytes())
+    rows = [("two.csv", "A", "EU", "Anna"), ("two.csv", "B", "EU", "Ben")]
+    rows = rows if column == "subject" else [("two.csv", "Ben", "EU", "")]
+    pd.DataFrame(rows, columns=["take", "signer", "kind", "subject"]).to_csv(tmp_path / "takes.csv", index=False)
+    corpus = read_corpus(tmp_path)
+    recipe = make_recipe()
+    for entry in corpus:
+        found = describe_entry(entry, recipe_of(entry, recipe, {}))
+        alone = solve(open_recording(dialogue / f"{entry.subject or entry.signer}.csv"))
+        np.testing.assert_allclose(found.weights, alone.weights, atol=1e-9)
+    if column == "subject":
+        assert [take_name(entry, tmp_path) for entry in corpus] == ["two@Anna", "two@Ben"]
 
 
 def test_a_cut_take_keeps_the_times_of_its_film(tmp_path, dialogue):
