@@ -14,7 +14,7 @@ import warnings
 
 import numpy as np
 
-from signface.study.responses import validate
+from signface.study.reading import validate
 from signface.study.statistics.model_tables import compare_methods
 from signface.study.statistics.rank_tests import wilcoxon
 from signface.study.statistics.simulation import Effects, crossed_design, simulate

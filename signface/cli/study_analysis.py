@@ -34,7 +34,8 @@ def add_analyse_arguments(parser: argparse.ArgumentParser) -> None:
 def run_analyse(arguments: argparse.Namespace) -> int:
     """Print the tables; write the report and the tables as CSV and LaTeX."""
     from signface.report.study.report import write_report
-    from signface.study.responses import combine, read_responses
+    from signface.study.reading import read_responses
+    from signface.study.responses import combine
     from signface.study.statistics.analysis import analyse
     from signface.study.statistics.tables import as_text
 

@@ -1,6 +1,5 @@
-"""The answers of a perceptual study: one row per answer, read once and validated.
+"""The answers of a perceptual study: one row per answer (`signface.study.reading` reads them).
 
-- `read_responses`: read the csv; everything that must be mended is said in one error, the rest becomes a warning.
 - `combine`: several groups of participants as one study.
 - `Responses`: the table with the derived column `correct`, its questions, methods, participants and warnings.
 - `QUESTIONS`, `FACTORS`: the columns that answer something and those that may explain it.
@@ -11,15 +10,13 @@ The columns are those of the thesis's questionnaires (section 6.3.2): `participa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from os import PathLike
 from pathlib import Path
 
 import pandas as pd
 
 from signface.content import Content
-from signface.errors import SignfaceError
 
 REQUIRED = ("participant", "stimulus", "expression", "method")
 
@@ -57,9 +54,6 @@ COLUMNS = (
     *("participant", *PERSONAL, "stimulus", "expression", "intensity", "method"),
     *("answer_expression", *SCALES),
 )
-
-_YES = {"yes", "oui", "y", "o", "true", "vrai", "1"}
-_NO = {"no", "non", "n", "false", "faux", "0"}
 
 #: The order of expressions in tables, whatever language or case names them; others follow in alphabetical order.
 _ORDER = (
@@ -149,41 +143,6 @@ def order_expressions(labels: Sequence[str]) -> list[str]:
     return sorted(labels, key=lambda label: (place.get(str(label).strip().lower(), len(_ORDER)), str(label)))
 
 
-def read_responses(path: str | PathLike[str]) -> Responses:
-    """Read and validate the answers of a study.
-
-    Parameters
-    ----------
-    path : path
-        A csv with a header, UTF-8, separated by commas or semicolons.
-
-    Returns
-    -------
-    Responses
-
-    Raises
-    ------
-    SignfaceError
-        The file cannot be read; a required column is missing; an answer is out of its range; a row names no
-        participant, stimulus, expression or method; a participant answered one stimulus twice and differently, or
-        has two ages, genders, habits or visions. All of it is said at once.
-    """
-    try:
-        raw = pd.read_csv(path, dtype=str, keep_default_na=False, sep=None, engine="python", encoding="utf-8-sig")
-    except FileNotFoundError as error:
-        raise SignfaceError(
-            "no such file", file=path, hint="name the csv that `signface study export` wrote"
-        ) from error
-    except (OSError, UnicodeDecodeError, pd.errors.ParserError, pd.errors.EmptyDataError, ValueError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise SignfaceError(f"cannot be read as a csv ({reason})", file=path, hint="save it as UTF-8 csv") from error
-    except Exception as error:
-        if type(error).__module__ == "_csv":  # the sniffer of separators gives up: one column, or not a table
-            raise SignfaceError("is no table", file=path, hint="save it as csv with a header") from error
-        raise
-    return validate(raw, name=str(path))
-
-
 def combine(studies: Sequence[Responses]) -> Responses:
     """The answers of several groups as one study: groups 2a and 2b of the thesis make tables 6.8 and 6.9 together.
 
@@ -208,193 +167,3 @@ def combine(studies: Sequence[Responses]) -> Responses:
     warnings = [f"{name}: {warning}" for name, study in zip(names, studies) for warning in study.warnings]
     simulated = any(study.simulated for study in studies)
     return Responses(pd.concat(tables, ignore_index=True), tuple(warnings), simulated, " + ".join(names))
-
-
-def validate(raw: pd.DataFrame, *, name: str = "responses") -> Responses:
-    """Turn a table of text into `Responses`; see `read_responses` for what is refused.
-
-    Parameters
-    ----------
-    raw : pandas.DataFrame
-        Text or numbers; the row numbers in messages count the header as row 1.
-    name : str
-        Opens the messages.
-    """
-    table = raw.copy()
-    table.columns = [str(column).strip() for column in table.columns]
-    table = table.reset_index(drop=True)
-    missing = [column for column in REQUIRED if column not in table]
-    answers = [column for column in ("answer_expression", *SCALES) if column in table]
-    if missing or not answers:
-        what = [f"column{'s' if len(missing) > 1 else ''} {_listed(missing)} missing"] if missing else []
-        what += [] if answers else ["no column of answers"]
-        raise SignfaceError(
-            "; ".join(what), file=name, hint=f"the columns are {', '.join((*REQUIRED, 'answer_expression', *SCALES))}"
-        )
-    if table.empty:
-        raise SignfaceError("holds no answer", file=name, hint="export it again once participants have answered")
-    warnings: list[str] = []
-    problems: list[str] = []
-    for column in (*PERSONAL, "intensity"):
-        if column not in table:
-            warnings.append(f"column {column!r} is missing: its influence is not analysed")
-            table[column] = ""
-    for column in ("answer_expression", *SCALES):
-        if column not in table:
-            table[column] = ""
-    for column in table.columns:
-        table[column] = table[column].map(_text)
-
-    for column in REQUIRED:
-        _refuse(problems, table[column] == "", f"no {column}")
-    for column in SCALES:
-        table[column] = _numbers(
-            problems, table[column], column, lambda value: value.between(*LIKERT) & (value % 1 == 0)
-        )
-    table["avatar_habit"] = _numbers(
-        problems, table["avatar_habit"], "avatar_habit", lambda value: value.between(*LIKERT) & (value % 1 == 0)
-    )
-    table["age"] = _numbers(problems, table["age"], "age", lambda value: value.between(5, 120))
-    table["intensity"] = _numbers(problems, table["intensity"], "intensity", lambda value: value >= 0)
-    vision = table["vision_problem"].str.lower()
-    _refuse(problems, ~vision.isin({"", *_YES, *_NO}), "vision_problem is neither yes nor no", table["vision_problem"])
-    table["vision_problem"] = vision.map(lambda word: "yes" if word in _YES else "no" if word in _NO else "")
-    for column in ("gender", "vision_problem", "answer_expression"):
-        table[column] = table[column].where(table[column] != "", None).astype(object)
-
-    simulated = bool("simulated" in table and table["simulated"].str.lower().isin(_YES).any())
-    asked = ["answer_expression", *SCALES]
-    blank = table[asked].isna().all(axis=1)
-    if blank.all():
-        problems.append("no row holds an answer")
-    elif blank.any():
-        warnings.append(f"{int(blank.sum())} rows without any answer left out")
-        table = table[~blank]
-    table = _once(table, warnings, problems)
-    for column, title in PERSONAL.items():
-        several = table.groupby("participant")[column].nunique()
-        several = several[several > 1]
-        if len(several):
-            who = several.index[0]
-            values = ", ".join(
-                str(value) for value in sorted(table.loc[table["participant"] == who, column].dropna().unique())
-            )
-            problems.append(
-                f"participant {who} has more than one {title} ({values})"
-                + (f", and so have {len(several) - 1} others" if len(several) > 1 else "")
-            )
-    if problems:
-        raise SignfaceError("; ".join(problems), file=name, hint="mend these rows and run the analysis again")
-
-    table = table.reset_index(drop=True)
-    right = (table["answer_expression"] == table["expression"]).astype(float)
-    table["correct"] = right.where(table["answer_expression"].notna())
-    kept = [*REQUIRED, *PERSONAL, "intensity", "answer_expression", *SCALES, "correct"]
-    responses = Responses(table[kept], (), simulated, name)
-    return Responses(responses.table, (*warnings, *_doubts(responses)), simulated, name)
-
-
-def _text(value: object) -> str:
-    if value is None or (isinstance(value, float) and value != value):
-        return ""
-    return str(value).strip()
-
-
-def _numbers(problems: list[str], words: pd.Series, column: str, valid: Callable[[pd.Series], pd.Series]) -> pd.Series:
-    """The words of a column as numbers, NaN where empty; what is no number or out of range is a problem."""
-    values = pd.to_numeric(words.where(words != ""), errors="coerce").astype(float)
-    wrong = (words != "") & ~(values.notna() & valid(values))
-    _refuse(problems, wrong, f"{column} out of range", words)
-    return values.where(~wrong)
-
-
-def _refuse(problems: list[str], wrong: pd.Series, what: str, words: pd.Series | None = None) -> None:
-    """Add one problem that names the first rows where `wrong` holds."""
-    rows = list(wrong.index[wrong])
-    if not rows:
-        return
-    named = ", ".join(f"{row + 2}" + (f" ({words[row]!r})" if words is not None else "") for row in rows[:SPELT_OUT])
-    more = f" and {len(rows) - SPELT_OUT} more" if len(rows) > SPELT_OUT else ""
-    problems.append(f"{what} in row{'s' if len(rows) > 1 else ''} {named}{more}")
-
-
-def _once(table: pd.DataFrame, warnings: list[str], problems: list[str]) -> pd.DataFrame:
-    """Keep one row for each participant, stimulus and method; rows that say the same are no harm."""
-    key = ["participant", "stimulus", "method", "expression", "intensity"]
-    answers = ["answer_expression", *SCALES]
-    again = table.duplicated(key, keep="first")
-    if not again.any():
-        return table
-    same = table.duplicated([*key, *answers], keep="first")
-    differing = table.index[again & ~same]
-    if len(differing):
-        first = table.loc[differing[0]]
-        problems.append(
-            f"participant {first['participant']} answered stimulus {first['stimulus']} twice and differently "
-            f"(row {differing[0] + 2})" + (f", and {len(differing) - 1} more such rows" if len(differing) > 1 else "")
-        )
-    if int(same.sum()):
-        warnings.append(f"{int(same.sum())} repeated rows left out (same participant, stimulus and answers)")
-    return table[~again]
-
-
-def _doubts(responses: Responses) -> list[str]:
-    """What is no error but changes what can be concluded."""
-    table, warnings = responses.table, []
-    if responses.simulated:
-        warnings.append("SIMULATED ANSWERS: no participant was asked; nothing can be concluded from them")
-    if len(responses.methods) == 1:
-        warnings.append(
-            f"one method only ({responses.methods[0]}): nothing to compare, the tests between methods are left out"
-        )
-    if len(responses.participants) < 5:
-        warnings.append(
-            f"{len(responses.participants)} participants: too few for intervals over participants to mean much"
-        )
-    answer_counts = table.groupby(["expression", "method"]).size().unstack(fill_value=0)
-    empty = [
-        f"{row} × {column}"
-        for row in answer_counts.index
-        for column in answer_counts.columns
-        if answer_counts.loc[row, column] == 0
-    ]
-    if empty:
-        warnings.append(f"no answer for {_listed(empty)}: the tests over expression and method are left out")
-    elif answer_counts.to_numpy().min() != answer_counts.to_numpy().max():
-        warnings.append(
-            "not every expression was shown equally often with every method: means by method mix unequal shares"
-        )
-    counts = table.groupby("participant").size()
-    if counts.nunique() > 1:
-        fewer = counts[counts < counts.max()]
-        warnings.append(
-            f"{len(fewer)} of {len(counts)} participants gave fewer than {counts.max()} answers "
-            f"(the fewest: {counts.idxmin()} with {counts.min()}): pairs are made of the answers that exist"
-        )
-    strange = sorted(set(table["answer_expression"].dropna()) - set(table["expression"]))
-    if strange:
-        warnings.append(f"answers name expressions that were never played: {_listed(strange)}")
-    for column, title in responses.questions.items():
-        if table[column].nunique() == 1 and column != "correct":
-            warnings.append(f"every answer about {title} is {table[column].dropna().iloc[0]:g}: nothing to test")
-        elif column in SCALES:
-            each = table.dropna(subset=[column]).groupby("participant")[column].agg(["nunique", "size"])
-            flat = each[(each["nunique"] == 1) & (each["size"] > 5)]
-            if len(flat):
-                warnings.append(f"always the same answer about {title}: {_listed(list(flat.index))}")
-    if "correct" in responses.questions and table["correct"].nunique() == 1:
-        warnings.append("every expression was recognised, or none: nothing to test about accuracy")
-    for column, title in PERSONAL.items():
-        people = responses.people()[column]
-        if people.notna().any() and people.isna().any():
-            warnings.append(f"{int(people.isna().sum())} participants did not give their {title}")
-        if people.nunique() == 1 and len(people) > 1:
-            warnings.append(
-                f"all participants have the same {title} ({people.dropna().iloc[0]}): its influence is not analysed"
-            )
-    return warnings
-
-
-def _listed(names: Sequence[str]) -> str:
-    head = ", ".join(str(name) for name in names[:SPELT_OUT])
-    return head + (f" and {len(names) - SPELT_OUT} more" if len(names) > SPELT_OUT else "")

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.optimize import approx_fprime
 
 from signface.errors import SignfaceError
-from signface.study.responses import validate
+from signface.study.reading import validate
 from signface.study.statistics.intervals import difference_intervals, participant_interval
 from signface.study.statistics.mixed_models import OrdinalMixedModel
 from signface.study.statistics.model_tables import compare_methods

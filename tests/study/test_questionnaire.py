@@ -13,7 +13,7 @@ from signface.errors import SignfaceError
 from signface.study.design import read_study
 from signface.study.questionnaire.export import COLUMNS, write_export
 from signface.study.questionnaire.questionnaire import check_answer, order_of, pages_of
-from signface.study.responses import read_responses
+from signface.study.reading import read_responses
 from tests.fixtures.study_site import ORGANISER, SMALL, Site, shipped_study, write_study
 
 pytest.importorskip("starlette", reason="needs the extra study")

@@ -16,7 +16,7 @@ import pytest
 from signface.cli import study_analysis
 from signface.errors import SignfaceError
 from signface.report.study.report import report_html, write_report
-from signface.study.responses import validate
+from signface.study.reading import validate
 from signface.study.statistics.analysis import Analysis, analyse
 from signface.study.statistics.simulation import Effects, simulate, thesis_design
 from signface.study.statistics.tables import StudyTable, as_latex, as_text, write_cell

@@ -6,7 +6,8 @@ import pandas as pd
 import pytest
 
 from signface.errors import SignfaceError
-from signface.study.responses import combine, order_expressions, read_responses, validate
+from signface.study.reading import read_responses, validate
+from signface.study.responses import combine, order_expressions
 from signface.study.statistics.analysis import analyse
 from signface.study.statistics.simulation import Effects, crossed_design, simulate
 

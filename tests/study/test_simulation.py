@@ -11,7 +11,7 @@ import pytest
 
 import signface
 from signface.errors import SignfaceError
-from signface.study.responses import validate
+from signface.study.reading import validate
 from signface.study.statistics.model_tables import compare_methods
 from signface.study.statistics.rank_tests import kruskal_wallis
 from signface.study.statistics.simulation import DESIGNS, Effects, crossed_design, simulate, thesis_design
