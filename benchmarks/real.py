@@ -33,7 +33,16 @@ from joblib import Parallel, delayed
 
 from benchmarks.real_boundaries import judged_boundaries, judged_jitter, scored_boundaries
 from benchmarks.real_pictures import draw_boundaries, draw_three
-from benchmarks.real_scores import DRAWS, FRAME_S, interval, judged_labels, judged_sentences, macro_f1, value_codes
+from benchmarks.real_scores import (
+    DRAWS,
+    Fold,
+    best_of_others,
+    frame_counts,
+    interval,
+    judged_labels,
+    judged_sentences,
+    macro_f1,
+)
 from signface.channels.rules import find_channels, read_channels
 from signface.corpus.examples import solve_corpus
 from signface.corpus.levels import learn_signers
@@ -59,9 +68,6 @@ CLIPS = TrainingSettings(
     aggregate="course",
     balanced=True,
 )
-
-#: A fold: who is trained on, and who is judged.
-Fold = tuple[list[Example], list[Example]]
 
 
 @dataclass(frozen=True)
@@ -170,21 +176,12 @@ def by_chosen_rule(folds: list[Fold], label: str) -> list[tuple[Example, pd.Data
         rule = {**rule, "signer": {**rule["signer"], **numbers}} if channel == "brows" else {**rule, **numbers}
         tables.append({channel: {**shipped, value: rule}})
     everyone = list({e.take: e for fold in folds for side in fold for e in side}.values())
-    found = [dict(zip([e.take for e in everyone], row, strict=True)) for row in _by_tables(everyone, channel, tables)]
-
-    def said(examples: list[Example], number: int) -> list[tuple[Example, pd.DataFrame]]:
-        result = []
-        for example in examples:
-            events = found[number][example.take]
-            names = [label if value in str(word) else NONE for word in events["value"]]
-            result.append((example, events.assign(label=names)))
-        return result
-
-    result = []
-    for train, test in folds:
-        scores = [judged_sentences(said(train, n), [label], intervals=False)["kappa"][0] for n in range(len(tables))]
-        result += said(test, int(np.nanargmax(scores)))
-    return result
+    found = []
+    for row in _by_tables(everyone, channel, tables):
+        names = [[label if value in str(word) else NONE for word in events["value"]] for events in row]
+        found.append({e.take: events.assign(label=n) for e, events, n in zip(everyone, row, names, strict=True)})
+    chosen = best_of_others(folds, found, label)
+    return [(e, found[n][e.take]) for (_, test), n in zip(folds, chosen, strict=True) for e in test]
 
 
 def _by_tables(examples: list[Example], channel: str, tables: list[dict]) -> list[list[pd.DataFrame]]:
@@ -221,13 +218,10 @@ def by_distance(folds: list[Fold], label: str) -> list[tuple[Example, pd.DataFra
         spans = [(a / take.rate, b / take.rate) for a, b in runs(active) if (b - a) / take.rate >= ms / 1000]
         return pd.DataFrame([(take.start + a, take.start + b, label) for a, b in spans], columns=COLUMNS)
 
-    result = []
-    for train, test in folds:
-        pairs = [[(e, found(e, *g)) for e in train] for g in grid]
-        scores = [judged_sentences(pair, [label], intervals=False)["kappa"][0] for pair in pairs]
-        best = grid[int(np.nanargmax(scores))]
-        result += [(e, found(e, *best)) for e in test]
-    return result
+    everyone = list({e.take: e for fold in folds for side in fold for e in side}.values())
+    tried = [{e.take: found(e, *g) for e in everyone} for g in grid]
+    chosen = best_of_others(folds, tried, label)
+    return [(e, tried[n][e.take]) for (_, test), n in zip(folds, chosen, strict=True) for e in test]
 
 
 COLUMNS = ["start_s", "end_s", "label"]
@@ -418,12 +412,7 @@ def gfe(here: Real, others: Real | None) -> list[Row]:
         else:
             folds = [([mine], restricted([e for e in judged if e.kind == name], [name]))]
         found = side_by_side(learnt_segments, folds, SHORT)
-        counts = np.zeros((len(found), 2, 2))
-        for row, (part, table) in enumerate(found):
-            take = part.descriptors
-            times = np.arange(take.start + FRAME_S / 2, take.start + take.duration, FRAME_S)
-            truth, said = (value_codes(t, times, [NONE, name]) for t in (part.reference.table, table))
-            np.add.at(counts[row], (truth[truth >= 0], np.maximum(said, 0)[truth >= 0]), 1)
+        counts = np.array([frame_counts(part, table, [NONE, name]) for part, table in found])
         times = np.concatenate([np.ones((1, len(found))), cluster_draws(len(found), DRAWS)])
         value = interval(macro_f1(np.einsum("ds,sij->dij", times, counts)))
         total.append(value[0])

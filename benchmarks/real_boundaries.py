@@ -14,6 +14,7 @@ from functools import partial
 from itertools import product
 
 import numpy as np
+from joblib import Parallel, delayed
 
 from benchmarks.real_scores import DRAWS, interval
 from signface.descriptors import Descriptors
@@ -63,12 +64,17 @@ def brows_of(take: Descriptors) -> Descriptors:
     return Descriptors(take.weights[:, columns], names, take.rate, take.start, name=take.name, settings=take.settings)
 
 
-def counts(examples: Sequence[Example], find: Finder, tolerance_s: float, *, floors: bool = True) -> np.ndarray:
-    """(S, 5) for each signer: matched, annotated, found, matched of as many at random (mean), of as many even ones."""
+def counts(
+    examples: Sequence[Example], places: Sequence[np.ndarray], tolerance_s: float, *, floors: bool = True
+) -> np.ndarray:
+    """(S, 5) for each signer: matched, annotated, found, matched of as many at random (mean), of as many even ones.
+
+    `places` are the boundaries found in each take.
+    """
     signers = sorted({example.signer for example in examples})
     rng, result = np.random.default_rng(0), np.zeros((len(signers), 5))
-    for example in examples:
-        take, true, found = example.descriptors, annotated_times(example), find(example.descriptors)
+    for example, found in zip(examples, places, strict=True):
+        take, true = example.descriptors, annotated_times(example)
         matched = len(match_times(true, found, tolerance_s))
         random = even = 0.0
         if floors:
@@ -81,23 +87,45 @@ def counts(examples: Sequence[Example], find: Finder, tolerance_s: float, *, flo
 
 
 def by_others(
-    examples: Sequence[Example], others: Sequence[Example] | None, find: Finder, tolerance_s: float
+    examples: Sequence[Example],
+    tried: Sequence[Sequence[np.ndarray]],
+    others: Sequence[Example] | None,
+    tried_on_others: Sequence[Sequence[np.ndarray]],
+    tolerance_s: float,
 ) -> np.ndarray:
-    """As `counts`, the boundaries of each signer found with what suits the other signers best.
+    """As `counts`, the boundaries of each signer found in that of the `tried` ways which suits the other signers best.
 
     The others are those of `examples`, or the signers of `others`.
     """
     learnt = examples if others is None else others
-    tried = np.array([counts(learnt, partial(find, **o), tolerance_s, floors=False) for o in TRIED])
+    ways = tried if others is None else tried_on_others
+    scores = np.array([counts(learnt, places, tolerance_s, floors=False) for places in ways])
     rows = []
     for row, signer in enumerate(sorted({example.signer for example in examples})):
-        kept = np.ones(tried.shape[1], dtype=bool)
+        kept = np.ones(scores.shape[1], dtype=bool)
         if others is None:
             kept[row] = False
-        matched, true, found = tried[:, kept, :3].sum(axis=1).T
-        best = TRIED[int(np.argmax(matched / (true + found)))]
-        rows.append(counts([e for e in examples if e.signer == signer], partial(find, **best), tolerance_s)[0])
+        matched, true, found = scores[:, kept, :3].sum(axis=1).T
+        best = tried[int(np.argmax(matched / (true + found)))]
+        own = [n for n, example in enumerate(examples) if example.signer == signer]
+        rows.append(counts([examples[n] for n in own], [best[n] for n in own], tolerance_s)[0])
     return np.array(rows)
+
+
+def found_in(examples: Sequence[Example], finders: Sequence[Finder]) -> list[list[np.ndarray]]:
+    """What each finder finds in each take, on both cores."""
+    halves = [[example.descriptors for example in examples[start::2]] for start in (0, 1)]
+    first, second = Parallel(n_jobs=2)(delayed(_all_found)(half, finders) for half in halves)
+    ways = []
+    for even, odd in zip(first, second, strict=True):
+        way: list[np.ndarray] = [np.empty(0)] * len(examples)
+        way[0::2], way[1::2] = even, odd
+        ways.append(way)
+    return ways
+
+
+def _all_found(takes: Sequence[Descriptors], finders: Sequence[Finder]) -> list[list[np.ndarray]]:
+    return [[find(take) for take in takes] for find in finders]
 
 
 def judged_boundaries(
@@ -107,14 +135,17 @@ def judged_boundaries(
 
     `others` are the persons that thresholds are chosen on, where they are not the other ones among `examples`.
     """
-    brows = [replace(example, descriptors=brows_of(example.descriptors)) for example in examples]
+    options = [partial(edges, **tried) for tried in TRIED]
+    plain, shaken, middle, *tried = found_in(examples, [edges, partial(edges, jitter_factor=0.0), middles, *options])
+    (brows,) = found_in([replace(e, descriptors=brows_of(e.descriptors)) for e in examples], [middles])
+    learnt = [] if others is None else found_in(others, options)
     for tolerance in TOLERANCES:
         for way, parts in (
-            ("as shipped", counts(examples, edges, tolerance)),
-            ("jitter counted as motion", counts(examples, partial(edges, jitter_factor=0.0), tolerance)),
-            ("thresholds chosen on the other signers", by_others(examples, others, edges, tolerance)),
-            ("middles of transitions", counts(examples, middles, tolerance)),
-            ("middles of transitions, brows alone", counts(brows, middles, tolerance)),
+            ("as shipped", counts(examples, plain, tolerance)),
+            ("jitter counted as motion", counts(examples, shaken, tolerance)),
+            ("thresholds chosen on the other signers", by_others(examples, tried, others, learnt, tolerance)),
+            ("middles of transitions", counts(examples, middle, tolerance)),
+            ("middles of transitions, brows alone", counts(examples, brows, tolerance)),
         ):
             yield f"{tolerance:g} s", way, _values(parts)
 

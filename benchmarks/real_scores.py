@@ -1,5 +1,6 @@
 """How close what was found is to what is annotated, with intervals over signers; for `benchmarks.real`.
 
+- `best_of_others`: which of several ways agrees best with the annotators of the signers who are not judged.
 - `judged_sentences`: what was found in whole takes. `judged_labels`: labels of given segments.
 """
 
@@ -17,9 +18,33 @@ from signface.metrics.bootstrap import cluster_draws
 
 FRAME_S, DRAWS = 0.04, 2000
 
+#: A fold: who is trained on, and who is judged.
+Fold = tuple[list[Example], list[Example]]
+
+
+def frame_counts(example: Example, table: pd.DataFrame, order: list[str]) -> np.ndarray:
+    """(L, L) frames of a take by what is annotated and what was found; frames that nothing is said of are left out."""
+    take = example.descriptors
+    times = np.arange(take.start + FRAME_S / 2, take.start + take.duration, FRAME_S)
+    truth, said = (value_codes(t, times, order) for t in (example.reference.table, table))
+    counts = np.zeros((len(order), len(order)))
+    np.add.at(counts, (truth[truth >= 0], np.maximum(said, 0)[truth >= 0]), 1)
+    return counts
+
+
+def best_of_others(folds: list[Fold], tried: list[dict[str, pd.DataFrame]], label: str) -> list[int]:
+    """For each fold the number of the way that agrees best (kappa of frames) with the annotators of its first side.
+
+    `tried` holds for each way what it finds in each take, by name.
+    """
+    everyone = list({e.take: e for fold in folds for side in fold for e in side}.values())
+    counts = np.array([[frame_counts(e, found[e.take], [NONE, label]) for e in everyone] for found in tried])
+    rows = {e.take: row for row, e in enumerate(everyone)}
+    return [int(np.nanargmax(kappas(counts[:, [rows[e.take] for e in train]].sum(axis=1)))) for train, _ in folds]
+
 
 def judged_sentences(
-    found: list[tuple[Example, pd.DataFrame]], labels: Sequence[str], *, intervals: bool = True
+    found: list[tuple[Example, pd.DataFrame]], labels: Sequence[str]
 ) -> dict[str, tuple[float, float, float]]:
     """Kappa and F1 of frames, F1 of segments, false alarms in takes without any, with intervals over signers."""
     order = [NONE, *labels]
@@ -28,19 +53,14 @@ def judged_sentences(
     segments, alarms = np.zeros((len(signers), 3)), np.zeros((len(signers), 2))
     for example, table in found:
         row = signers.index(example.signer)
-        times = np.arange(
-            example.descriptors.start + FRAME_S / 2, example.descriptors.start + example.descriptors.duration, FRAME_S
-        )
-        truth, said = (value_codes(t, times, order) for t in (example.reference.table, table))
-        np.add.at(counts[row], (truth[truth >= 0], np.maximum(said, 0)[truth >= 0]), 1)
+        counts[row] += frame_counts(example, table, order)
         true, hit = (t[t["label"].isin(labels)] for t in (example.reference.table, table))
         for label in labels:
             a, b = (t[t["label"] == label].reset_index(drop=True) for t in (true, hit))
             segments[row] += (len(match_annotations(a, b, overlap=0.5)), len(a), len(b))
         if not len(true):
             alarms[row] += (len(hit) > 0, 1)
-    draws = DRAWS if intervals else 1
-    times = np.concatenate([np.ones((1, len(signers))), cluster_draws(len(signers), draws)])
+    times = np.concatenate([np.ones((1, len(signers))), cluster_draws(len(signers), DRAWS)])
     drawn = np.einsum("ds,sij->dij", times, counts)
     parts, alarm = times @ segments, times @ alarms
     with np.errstate(invalid="ignore", divide="ignore"):

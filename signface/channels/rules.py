@@ -36,6 +36,8 @@ VALUE_KEYS = {"description", "bases", "minus", "combine", "on", "off", "min_ms",
 SIGNER_KEYS = {"minus", "on", "off", "min_ms", "max_ms", "gap_ms", "per_pitch_deg", "take", "smooth_ms"}
 #: A signer's range is taken as at least this wide (half of it, weights), so that rest is not blown up to expression.
 LEAST_RANGE = 0.05
+#: Labels that have no degree: the neutral face, and what a model did not know.
+NO_DEGREE = ("N", "unknown")
 
 
 def read_channels(name: str | PathLike[str] = "default") -> dict[str, dict[str, Any]]:
@@ -198,7 +200,7 @@ def _as_events(channel: str, table: Mapping[str, Any], events: pd.DataFrame) -> 
 def find_intensities(
     descriptors: Descriptors, segments: Segments, channels: Mapping[str, Mapping[str, Any]] | None = None
 ) -> Segments:
-    """The segments with a column `intensity`: 1, 2 or 3 for stable ones, missing for transitions and neutral.
+    """The segments with a column `intensity`: 1, 2 or 3 for stable ones, missing for transitions, neutral and unknown.
 
     Parameters
     ----------
@@ -214,7 +216,7 @@ def find_intensities(
     for row in table.itertuples(index=False):
         frames = (time >= row.start_s) & (time < row.end_s)
         strength = np.linalg.norm(np.nanmean(descriptors.weights[frames], axis=0)) if frames.any() else np.nan
-        stable = row.kind == "stable" and row.label != "N" and np.isfinite(strength)
+        stable = row.kind == "stable" and row.label not in NO_DEGREE and np.isfinite(strength)
         levels.append(1 + (strength >= limits["marked"]) + (strength >= limits["extreme"]) if stable else None)
     table["intensity"] = pd.array([None if level is None else int(level) for level in levels], dtype="Int64")
     return segments.changed("find_intensities", table)

@@ -24,6 +24,7 @@ from signface.channels.rules import (
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
 from signface.head import head_angles
+from signface.label.vocabulary import UNKNOWN
 from signface.segmentation.segments import Segments
 from signface.signer_level import signer_level
 
@@ -225,6 +226,12 @@ def test_swings_are_wide_enough_and_go_back_and_forth(angle, smallest):
     steps = np.diff(curve[turns])
     assert (np.abs(steps) >= smallest - 1e-9).all()
     assert (steps[1:] * steps[:-1] < 0).all()
+
+
+def test_what_a_model_did_not_know_has_no_intensity():
+    take = moving(mouthSmileLeft=[(0.0, 1.0, 0.9)])
+    table = pd.DataFrame([(0.0, 1.0, "stable", UNKNOWN)], columns=["start_s", "end_s", "kind", "label"])
+    assert find_intensities(take, Segments(table, name="take")).table["intensity"].isna().all()
 
 
 def test_intensity_grows_with_the_strength_of_the_face():
