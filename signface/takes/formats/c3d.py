@@ -112,7 +112,7 @@ def _frames(file: Path, structure: Structure, kept: list[int], begin: int, end: 
     positions = numbers[..., :3].astype(np.float64)
     if structure.scale > 0:
         positions *= structure.scale
-    positions[(numbers[..., 3] < 0) | (positions == 0).all(axis=2)] = np.nan
+    positions[numbers[..., 3] < 0] = np.nan
     return positions
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from signface.errors import SignfaceError
 from signface.files import reading
 from signface.marker_names import SeveralSigners
+from signface.takes.formats.missing import mark_missing
 from signface.takes.formats.people import RIVAL, followed
 from signface.takes.formats.registry import FileHead, register_format
 from signface.takes.take import Take
@@ -121,7 +122,7 @@ def read_pose(path: str | PathLike[str], *, unit: str | None = None, subject: st
     """Read the face landmarks of a `.pose` file as a take; labels are the landmarks' indices ("33", "263").
 
     Works with the 468, the 478 (with irises) and the 128-point (contours) sets. A landmark is missing where its
-    confidence is 0. People are followed by where they are, whatever their index (`people.followed`). The scale is one
+    confidence is 0, or all its coordinates are. People are followed by where they are, whatever their index (`people.followed`). The scale is one
     number for the whole take: nearer and farther from the camera remain visible as growing and shrinking.
 
     Parameters
@@ -152,8 +153,8 @@ def read_pose(path: str | PathLike[str], *, unit: str | None = None, subject: st
     if not (np.isfinite(rate) and rate > 0):
         raise SignfaceError("the .pose file has the rate 0", file=file, hint="extract it again from the video")
     landmarks, confidence, names, notes, deep = _landmarks(pose, file, subject)
-    missing = ~(confidence > 0) | ~np.isfinite(landmarks).all(axis=2) | (np.abs(landmarks) > 1e6).any(axis=2)
-    landmarks[missing] = np.nan
+    landmarks[~(confidence > 0) | (np.abs(landmarks) > 1e6).any(axis=2)] = np.nan
+    missing = np.isnan(mark_missing(landmarks)[..., 0])
     if missing.all():
         raise SignfaceError("no face is seen in the .pose file", file=file, hint="extract it again")
     with warnings.catch_warnings():

@@ -91,7 +91,6 @@ def open_table(path: str | PathLike[str], *, unit: str | None = None) -> TakeFil
         unit=unit,
         start=float(times[0]),
         history=(f"read {file.name} (CSV)", *notes),
-        zero_is_missing=False,
     )
 
 

@@ -20,15 +20,12 @@ import numpy as np
 
 from signface.errors import SignfaceError
 from signface.files import reading
+from signface.takes.formats.missing import MISSING
 from signface.takes.formats.units import in_millimetres
 from signface.takes.recording import TakeFile
 
 #: Bytes that are looked through at a time for the beginnings of lines, and rows whose times are read at a time.
 BLOCK, ROWS = 1 << 20, 16384
-
-#: What stands in the cells of a missing marker, as programs and spreadsheets write it.
-MISSING = {"", "-", "NaN", "nan", "-NaN", "-nan", "1.#IND", "-1.#IND", "1.#QNAN", "-1.#QNAN"}
-MISSING |= {"NULL", "null", "None", "NA", "<NA>", "#NA", "N/A", "n/a", "#N/A", "#N/A N/A"}
 
 #: What a blank line consists of: the signs up to the space.
 BLANK = "".join(map(chr, range(33)))
@@ -345,7 +342,6 @@ def marker_rows(
     unit: str | None,
     start: float,
     history: tuple[str, ...],
-    zero_is_missing: bool = True,
 ) -> TakeFile:
     """Rows of numbers as a recording.
 
@@ -359,8 +355,6 @@ def marker_rows(
         As of `Take`; a note of the unit joins the history as its second entry.
     units, unit : str, optional
         As `in_file` and `given` of `signface.takes.formats.units.unit_factor`.
-    zero_is_missing : bool
-        Whether a marker at exactly (0, 0, 0) is a missing one.
 
     Raises
     ------
@@ -371,10 +365,7 @@ def marker_rows(
 
     def raw(begin: int, end: int, step: int = 1) -> np.ndarray:
         values = rows.values(begin, end, step)
-        positions = values[:, columns.ravel()].reshape(len(values), len(columns), 3)
-        if zero_is_missing:
-            positions[(positions == 0).all(axis=2)] = np.nan
-        return positions
+        return values[:, columns.ravel()].reshape(len(values), len(columns), 3)
 
     read, note = in_millimetres(raw, len(rows), units, unit, markers=len(labels), file=file)
     return TakeFile(

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from signface.errors import SignfaceError
+from signface.takes.formats.missing import mark_missing
 
 #: Millimetres in one of each unit, by the spellings that motion-capture software writes.
 MILLIMETRES = {
@@ -133,11 +134,17 @@ def in_millimetres(
 ) -> tuple[Callable[[int, int, int], np.ndarray], str]:
     """`raw(begin, end, step)`, which reads positions in the file's unit, made to read millimetres; and a note of it.
 
+    Missing markers (`signface.takes.formats.missing`) come as NaN.
+
     A unit that is not one of length is a `SignfaceError` that names the file.
     """
     step = max(1, frames // SAMPLE)
+
+    def seen(begin: int, end: int, step: int) -> np.ndarray:
+        return mark_missing(raw(begin, end, step))
+
     try:
-        factor, note = unit_factor(in_file, given, markers=markers, sample=lambda: raw(0, frames, step))
+        factor, note = unit_factor(in_file, given, markers=markers, sample=lambda: seen(0, frames, step))
     except SignfaceError as error:
         raise error.at(file) from error
-    return lambda begin, end, step: raw(begin, end, step) * factor, note
+    return lambda begin, end, step: seen(begin, end, step) * factor, note
