@@ -10,7 +10,11 @@ The formats are those of `signface.takes.formats.registry`, which also says how 
 
 from __future__ import annotations
 
+import inspect
+import math
+from dataclasses import replace
 from os import PathLike
+from typing import Any
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError
@@ -47,6 +51,8 @@ def open_recording(
     path: str | PathLike[str],
     *,
     unit: str | None = None,
+    rate: float | None = None,
+    start: float | None = None,
     read_as: str | None = None,
     subject: str | None = None,
     film_timecode: str | None = None,
@@ -61,6 +67,10 @@ def open_recording(
     path : path
     unit : str, optional
         Unit of length of the file ("mm", "m", ...), where it says none or a wrong one.
+    rate : float, optional
+        Frames per second (Hz), where it says none or a wrong one: every row is then a frame, whatever its time.
+    start : float, optional
+        Time of the first frame (s), where the file says another.
     read_as : str, optional
         `aus`: the action units of an OpenFace table that holds landmarks too.
     subject : str, optional
@@ -93,7 +103,10 @@ def open_recording(
     """
     try:
         kind = format_of(path, read_as)
-        recording = kind.open(path, unit=unit, **({"subject": subject} if kind.chooses_subject else {}))
+        options: dict[str, Any] = {"subject": subject} if kind.chooses_subject else {}
+        if rate is not None and "rate" in inspect.signature(kind.open).parameters:
+            options["rate"] = rate
+        recording = _retimed(kind.open(path, unit=unit, **options), rate, start)
         if subject is not None and not kind.chooses_subject:
             if isinstance(recording, Descriptors):
                 raise SignfaceError("holds weights of one person, who has no name", hint="leave out --subject")
@@ -112,10 +125,31 @@ def open_recording(
         raise error.at(path) from error
 
 
+def _retimed(
+    recording: Take | TakeFile | Descriptors, rate: float | None, start: float | None
+) -> Take | TakeFile | Descriptors:
+    """The recording at the rate and from the start that are given."""
+    history = recording.history
+    if rate is not None:
+        if not 0 < rate < math.inf:
+            raise SignfaceError(f"the rate must be positive, not {rate:g}", hint="give its frames per second")
+        history = (*history, f"rate {rate:g} Hz (given)")
+    if start is not None:
+        if not math.isfinite(start):
+            raise SignfaceError(f"the start is no time: {start}", hint="give seconds")
+        history = (*history, f"start {start:g} s (given)")
+    if history == recording.history:
+        return recording
+    rate, start = recording.rate if rate is None else rate, recording.start if start is None else start
+    return replace(recording, rate=rate, start=start, history=history)
+
+
 def read_recording(
     path: str | PathLike[str],
     *,
     unit: str | None = None,
+    rate: float | None = None,
+    start: float | None = None,
     read_as: str | None = None,
     subject: str | None = None,
     film_timecode: str | None = None,
@@ -133,7 +167,9 @@ def read_recording(
     >>> type(recording).__name__, recording.duration
     ('Take', 5.92)
     """
-    recording = open_recording(path, unit=unit, read_as=read_as, subject=subject, film_timecode=film_timecode)
+    recording = open_recording(
+        path, unit=unit, rate=rate, start=start, read_as=read_as, subject=subject, film_timecode=film_timecode
+    )
     if not isinstance(recording, TakeFile):
         return recording
     try:
@@ -142,7 +178,14 @@ def read_recording(
         raise error.at(path) from error
 
 
-def read_take(path: str | PathLike[str], *, unit: str | None = None, subject: str | None = None) -> Take:
+def read_take(
+    path: str | PathLike[str],
+    *,
+    unit: str | None = None,
+    rate: float | None = None,
+    start: float | None = None,
+    subject: str | None = None,
+) -> Take:
     """Read a recording that holds markers; of one `subject`, where it holds those of several.
 
     Raises
@@ -162,7 +205,7 @@ def read_take(path: str | PathLike[str], *, unit: str | None = None, subject: st
     >>> take.n_frames, take.rate, take.labels[:3]
     (2149, 200.0, ('LBROI', 'RBROI', 'LBROM'))
     """
-    recording = read_recording(path, unit=unit, subject=subject)
+    recording = read_recording(path, unit=unit, rate=rate, start=start, subject=subject)
     if isinstance(recording, Descriptors):
         raise SignfaceError("holds weights, not markers", file=path, hint="give a recording of markers")
     return recording

@@ -411,7 +411,7 @@ def test_a_weights_file_is_recognised_under_any_ending(tmp_path):
 
 def test_any_white_space_separates_and_blank_lines_do_not_count(tmp_path):
     file = tmp_path / "rows.txt"
-    file.write_text("\nNAMES\n\n  1  2 \t -  \n\n4 5 nan 7\n")
+    file.write_text("\nNAMES\n\n  1  2 \t -  \n\n4 5 nan\n")
     for separator in (" ", None):
         rows = TextRows(TextFile(file), 1, 3, separator)
         np.testing.assert_array_equal(rows.values(0, 2), [[1, 2, np.nan], [4, 5, np.nan]])
@@ -421,6 +421,9 @@ def test_any_white_space_separates_and_blank_lines_do_not_count(tmp_path):
     for read in (lambda: rows.values(0, 2), lambda: rows.column(1)):
         with pytest.raises(SignfaceError, match="line 5 has a cell that is no number: 'high'"):
             read()
+    file.write_text("NAMES\n1 2 3\n4 5 nan 7\n")
+    with pytest.raises(SignfaceError, match="line 3 has 4 cells instead of 3"):
+        TextRows(TextFile(file), 1, 3, None).values(0, 2)
     file.write_text("NAMES\n1 2  \n")
     with pytest.raises(SignfaceError, match="line 2 has 2 cells instead of 3"):
         TextRows(TextFile(file), 1, 3, None).values(0, 1)

@@ -18,8 +18,24 @@ MISSING |= {form(sign + word) for sign in ("", "-", "+") for word in _WORDS for 
 MISSING |= {"NaN", "-NaN", "+NaN", "NaN(ind)", "-NaN(ind)"}
 
 #: Where x, y and z are all one of these, up to their sign, they are a program's word for none, not a place.
-SENTINELS = (999.0, 999.9, 999.99, 999.999, 9999.0, 9999.9, 9999.99, 9999.999, 99999.0, 99999.9, 99999.99, 999999.0)
-SENTINELS += (9999999.0, 99999999.0, 999999999.0, 9999999999.0, 32767.0, 32768.0, 1e6, 1e7, 1e8, 1e9, 1e10)
+SENTINELS: tuple[float, ...] = (999.0, 999.9, 999.99, 999.999, 9999.0, 9999.9, 9999.99, 9999.999)
+SENTINELS += (
+    99999.0,
+    99999.9,
+    99999.99,
+    999999.0,
+    9999999.0,
+    99999999.0,
+    999999999.0,
+    9999999999.0,
+    32767.0,
+    32768.0,
+    1e6,
+    1e7,
+    1e8,
+    1e9,
+    1e10,
+)
 #: Beyond this, in any unit, nothing is a place (float's largest number and its like).
 FARTHEST = 1e12
 

@@ -15,10 +15,13 @@ from pathlib import Path
 import numpy as np
 
 from signface.errors import SignfaceError
+from signface.takes.formats.doubts import doubt
 from signface.takes.formats.registry import FileHead, register_format
 from signface.takes.formats.text import TextFile, TextRows, marker_rows
+from signface.takes.formats.timing import Clock, declared_clock
 from signface.takes.labels import clean_labels
 from signface.takes.recording import TakeFile
+from signface.takes.take import Take
 
 #: The names that open header lines; a line that opens with a number is the first frame.
 HEADER_WORD = re.compile(r"^[A-Z][A-Z_]+$")
@@ -46,7 +49,7 @@ def _certainty(head: FileHead) -> float:
 @register_format(
     "qtm", title="Qualisys TSV", written_by="Qualisys Track Manager", endings=(".tsv",), recognise=_certainty
 )
-def open_qtm(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
+def open_qtm(path: str | PathLike[str], *, unit: str | None = None, rate: float | None = None) -> TakeFile | Take:
     """Open a TSV file of Qualisys Track Manager with 3-D data and its header; frames are read when asked for.
 
     A marker is missing where its cells are empty, not finite, or all exactly zero (QTM's way of writing gaps).
@@ -75,11 +78,9 @@ def open_qtm(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
     if not any(names):
         raise SignfaceError("the TSV file has no marker names", file=file, hint="export it with MARKER_NAMES")
     try:
-        rate = float(" ".join(fields.get("FREQUENCY", ["nan"])).replace(",", "."))
+        declared_rate = float(" ".join(fields.get("FREQUENCY", ["nan"])).replace(",", "."))
     except ValueError:
-        rate = math.nan
-    if not (math.isfinite(rate) and rate > 0):
-        raise SignfaceError("the TSV file has no rate", file=file, hint="set FREQUENCY to its frames per second")
+        declared_rate = math.nan
     rows = lines[length:]
     before, time_at = 0, None
     if rows and rows[0].split("\t")[0].strip().lower() in ("frame", "time"):
@@ -90,20 +91,26 @@ def open_qtm(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
     elif rows and re.match(r"^[^\t]*[XYZ](\t|$)", rows[0].strip()):
         rows, length = rows[1:], length + 1
     filled = next((line for line in rows if line.strip()), "")
-    if not before and len(filled.rstrip("\t\r\n ").split("\t")) == 3 * markers + 2:
-        before, time_at = 2, 1  # frame and time without a line of column names
+    extra = len(filled.rstrip("\t\r\n ").split("\t")) - 3 * markers
+    if not before and extra in (1, 2):
+        before, time_at = extra, extra - 1  # (frame and) time without a line of column names
     table = TextRows(text, length, before + 3 * markers, "\t")
     kept, labels, notes = clean_labels(names)
     if not kept:
         raise SignfaceError("none of the markers in the TSV file has a label", file=file, hint="label the markers")
-    start = float(table.values(0, 1)[0, time_at]) if time_at is not None else 0.0
+    times = None if time_at is None else table.column(time_at)
+    if times is not None and extra == 1 and time_at == 0 and (np.diff(times) == np.round(np.diff(times))).all():
+        times = None  # numbers of frames
+    clock = Clock(rate, 0.0) if rate else declared_clock(declared_rate, times, file, name="FREQUENCY")
+    stated = " ".join(fields.get("NO_OF_FRAMES", [])).strip()
+    if stated.isdigit() and int(stated) != len(table):
+        notes = [doubt(file, f"has {len(table)} frames and NO_OF_FRAMES says {stated}: it may be cut short"), *notes]
     return marker_rows(
         table,
         np.array(kept)[:, None] * 3 + np.arange(before, before + 3),
         labels,
-        rate,
+        clock,
         units="mm",
         unit=unit,
-        start=start if math.isfinite(start) else 0.0,
         history=(f"read {file.name} (Qualisys TSV)", *notes),
     )

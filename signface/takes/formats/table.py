@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import re
 from os import PathLike
 from pathlib import Path
 
@@ -13,12 +14,18 @@ import numpy as np
 from signface.errors import SignfaceError
 from signface.files import whole_file
 from signface.takes.formats.registry import FileHead, register_format
-from signface.takes.formats.text import TextFile, TextRows, even_rate, header_cells, marker_rows
+from signface.takes.formats.text import TextFile, TextRows, header_cells, marker_rows
+from signface.takes.formats.timing import Clock, read_clock
 from signface.takes.labels import clean_labels
 from signface.takes.recording import TakeFile
 from signface.takes.take import Take
 
 AXES = ("x", "y", "z")
+
+#: A column of times: `time_s`, `Time`, `Time (Seconds)`, `timestamp_ms`, `t` ...
+TIME = re.compile(
+    r"^(time|timestamp|time ?code|t)([ _]*[\[(]?(s|sec|seconds?|ms|msec|us|µs|ns|min|unix|utc)?[\])]?)$", re.I
+)
 
 
 def _markers(columns: list[str], file: Path) -> tuple[list[str], np.ndarray]:
@@ -58,7 +65,7 @@ def _certainty(head: FileHead) -> float:
     endings=(".csv",),
     recognise=_certainty,
 )
-def open_table(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
+def open_table(path: str | PathLike[str], *, unit: str | None = None, rate: float | None = None) -> TakeFile | Take:
     """Open a wide CSV (separated by commas, semicolons or tabs): `time_s`, then three columns a marker.
 
     Empty cells are missing markers. The unit is inferred from the spread of the markers unless it is given.
@@ -66,19 +73,18 @@ def open_table(path: str | PathLike[str], *, unit: str | None = None) -> TakeFil
     Raises
     ------
     SignfaceError
-        The columns are others, a row is cut short, a cell is no number, or the times do not rise evenly.
+        The columns are others, a row is cut short, a cell is no number, or the times are none of a camera's.
     """
     file = Path(path)
     text = TextFile(file)
     columns, separator = header_cells(text.lines(0, 1)[0][1])
-    if not columns or columns[0].lower() not in ("time_s", "time", "time (s)"):
+    if not columns or not TIME.match(columns[0]):
         raise SignfaceError("its first column is not time_s", file=file, hint="put the time in seconds there")
     while columns and not columns[-1]:
         columns.pop()
     labels, coordinates = _markers(columns, file)
     rows = TextRows(text, 1, len(columns), separator)
-    times = rows.column(0)
-    rate = even_rate(times, file)
+    clock = Clock(rate, 0.0) if rate else read_clock(rows.column(0), file, heading=columns[0])
     kept, names, notes = clean_labels(labels)
     if not kept:
         raise SignfaceError("none of the markers has a label", file=file, hint="label the markers")
@@ -86,10 +92,9 @@ def open_table(path: str | PathLike[str], *, unit: str | None = None) -> TakeFil
         rows,
         coordinates[kept],
         names,
-        rate,
+        clock,
         units=None,
         unit=unit,
-        start=float(times[0]),
         history=(f"read {file.name} (CSV)", *notes),
     )
 

@@ -5,7 +5,6 @@
 - `TextFile`, `TextRows`: a file whose lines, or rows of numbers, are read in pieces.
 - `numbers`: cells to a table of floats, quickly, with the line and the cell named that do not fit.
 - `marker_rows`: rows of numbers as a recording.
-- `even_rate`: the rate from a column of times.
 """
 
 from __future__ import annotations
@@ -21,8 +20,11 @@ import numpy as np
 from signface.errors import SignfaceError
 from signface.files import reading
 from signface.takes.formats.missing import MISSING
+from signface.takes.formats.timing import GAP, Clock
+from signface.takes.formats.uneven import even_frames
 from signface.takes.formats.units import in_millimetres
 from signface.takes.recording import TakeFile
+from signface.takes.take import Take
 
 #: Bytes that are looked through at a time for the beginnings of lines, and rows whose times are read at a time.
 BLOCK, ROWS = 1 << 20, 16384
@@ -232,6 +234,12 @@ def _check_cells(lines: Sequence[tuple[int, str]], columns: int, separator: str 
             raise SignfaceError(
                 f"line {number} has {cells} cells instead of {columns}", file=file, hint="the file may be cut short"
             )
+        if cells > columns and any(cell.strip() for cell in line.split(separator)[columns:]):
+            raise SignfaceError(
+                f"line {number} has {cells} cells instead of {columns}",
+                file=file,
+                hint="export it again: its header and its rows disagree",
+            )
 
 
 def _no_number(line: int, cell: str, file: Path) -> SignfaceError:
@@ -243,8 +251,8 @@ def numbers(
 ) -> np.ndarray:
     """Lines of cells to a (rows, columns) float64 array; an empty cell, `-`, `nan` or `null` is NaN.
 
-    Cells beyond `columns` are left out (many exporters end their lines with a separator). Numbers have a decimal point,
-    or a decimal comma where the separator is another sign.
+    Empty cells beyond `columns` are left out (many exporters end their lines with a separator). Numbers have a decimal
+    point, or a decimal comma where the separator is another sign.
 
     Parameters
     ----------
@@ -262,8 +270,8 @@ def numbers(
     Raises
     ------
     SignfaceError
-        A row has fewer cells than columns (the last one is often cut short), or a cell is a word; the message names
-        the line.
+        A row has fewer cells than columns (the last one is often cut short) or more, or a cell is a word; the message
+        names the line.
 
     Examples
     --------
@@ -304,45 +312,17 @@ def numbers(
         raise SignfaceError("has cells that are not numbers", file=file, hint="export it again") from error
 
 
-def even_rate(times: np.ndarray, file: Path) -> float:
-    """Frames per second (Hz) from times in seconds that rise evenly.
-
-    Times are often written with three digits, so that 1/120 s comes as 0.008, 0.017: the mean step over the whole
-    file is right where single steps are not. Where a whole number is within that rounding, it is the rate; 29.97 Hz
-    stays 29.97 Hz in any file long enough to tell.
-
-    Raises
-    ------
-    SignfaceError
-        Fewer than two times, or they do not rise evenly.
-    """
-    if len(times) < 2:
-        raise SignfaceError("has one frame, and a rate needs two", file=file, hint="export more of the recording")
-    steps = np.diff(times)
-    if not np.isfinite(times).all() or not (steps > 0).all():
-        raise SignfaceError("its times do not rise from row to row", file=file, hint="export it again")
-    step = float(times[-1] - times[0]) / (len(times) - 1)
-    rounding = 0.0005 if np.allclose(times * 1000, np.round(times * 1000), rtol=0, atol=1e-6) else 0.0000005
-    if np.abs(steps - step).max() > 0.25 * step + 2 * rounding:
-        raise SignfaceError(
-            "its times do not rise evenly", file=file, hint="export it at one rate, with empty cells for gaps"
-        )
-    rate = 1 / step
-    unsure = rate * 2 * rounding / float(times[-1] - times[0])
-    return float(round(rate)) if abs(rate - round(rate)) <= unsure and round(rate) > 0 else rate
-
-
 def marker_rows(
     rows: TextRows,
     columns: np.ndarray,
     labels: Sequence[str],
-    rate: float,
+    rate: float | Clock,
     *,
     units: str | None,
     unit: str | None,
-    start: float,
+    start: float = 0.0,
     history: tuple[str, ...],
-) -> TakeFile:
+) -> TakeFile | Take:
     """Rows of numbers as a recording.
 
     Parameters
@@ -351,8 +331,11 @@ def marker_rows(
         A row for each frame. A marker of which one coordinate is missing is missing.
     columns : (M, 3) int array
         Columns of x, y and z of each marker.
-    labels, rate, start, history
+    labels, start, history
         As of `Take`; a note of the unit joins the history as its second entry.
+    rate : float or Clock
+        Frames per second (Hz), or what a column of times tells (`signface.takes.formats.timing`): it brings the start
+        and its notes, and rows that do not come evenly are put on an even clock, in memory.
     units, unit : str, optional
         As `in_file` and `given` of `signface.takes.formats.units.unit_factor`.
 
@@ -367,13 +350,10 @@ def marker_rows(
         values = rows.values(begin, end, step)
         return values[:, columns.ravel()].reshape(len(values), len(columns), 3)
 
+    clock = rate if isinstance(rate, Clock) else Clock(rate, start)
     read, note = in_millimetres(raw, len(rows), units, unit, markers=len(labels), file=file)
-    return TakeFile(
-        tuple(labels),
-        rate,
-        len(rows),
-        read,
-        start=start,
-        name=file.stem,
-        history=(history[0], note, *history[1:]),
-    )
+    history = (history[0], note, *clock.notes, *history[1:])
+    if clock.times is None:
+        return TakeFile(tuple(labels), clock.rate, len(rows), read, clock.start, file.stem, history)
+    positions, _ = even_frames(clock.times, read(0, len(rows), 1)[clock.rows], clock.rate, longest_s=GAP / clock.rate)
+    return Take(positions, tuple(labels), clock.rate, clock.start, file.stem, history)

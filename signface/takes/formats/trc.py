@@ -13,10 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from signface.errors import SignfaceError
+from signface.takes.formats.doubts import doubt
 from signface.takes.formats.registry import register_format
-from signface.takes.formats.text import TextFile, TextRows, even_rate, marker_rows
+from signface.takes.formats.text import TextFile, TextRows, marker_rows
+from signface.takes.formats.timing import Clock, declared_clock
 from signface.takes.labels import clean_labels
 from signface.takes.recording import TakeFile
+from signface.takes.take import Take
 
 
 def _float(word: str) -> float:
@@ -33,7 +36,7 @@ def _float(word: str) -> float:
     endings=(".trc",),
     recognise=lambda head: head.text.startswith("PathFileType"),
 )
-def open_trc(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
+def open_trc(path: str | PathLike[str], *, unit: str | None = None, rate: float | None = None) -> TakeFile | Take:
     """Open a TRC file; its frames are read when they are asked for.
 
     A marker is missing where its cells are empty, not finite, or all exactly zero. The unit is the header's
@@ -59,7 +62,13 @@ def open_trc(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
     if len(heads) < 3 or heads[0].lower() not in ("frame#", "frame") or heads[1].lower() != "time":
         raise SignfaceError("the TRC file has no line of marker names", file=file, hint="export it again")
     declared = fields.get("nummarkers", "")
-    markers = int(declared) if declared.isdigit() else sum(1 for name in heads[2:] if name)
+    named = sum(1 for name in heads[2:] if name)
+    markers = int(declared) if declared.isdigit() else named
+    if markers < named:  # the rows have as many cells as markers are named, or they are refused for it
+        note = doubt(file, f"names {named} markers and NumMarkers says {declared}: the names were believed")
+        markers = named
+    else:
+        note = ""
     names = (heads[2::3] + [""] * markers)[:markers]
     if markers == 0:
         raise SignfaceError("the TRC file has no markers", file=file, hint="export the trajectories with it")
@@ -68,22 +77,21 @@ def open_trc(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
     if len(heads) < 2 + 3 * (markers - 1) + 1:
         raise SignfaceError(f"the TRC file declares {markers} markers and names {sum(map(bool, names))}", file=file)
     rows = TextRows(text, int(np.searchsorted(text.line_numbers, 6)), 2 + 3 * markers, "\t")
-    rate = _float(fields.get("datarate", ""))
-    if math.isnan(rate):
-        rate = even_rate(rows.column(1), file)
-    if not (math.isfinite(rate) and rate > 0):
-        raise SignfaceError("the TRC file has the rate 0", file=file, hint="set DataRate to its frames per second")
+    declared_rate = _float(fields.get("datarate", ""))
+    clock = Clock(rate, 0.0) if rate else declared_clock(declared_rate, rows.column(1), file, name="DataRate")
+    stated = fields.get("numframes", "")
+    doubts = []
+    if stated.isdigit() and int(stated) != len(rows):
+        doubts = [doubt(file, f"has {len(rows)} frames and NumFrames says {stated}: it was cut, or is cut short")]
     kept, labels, notes = clean_labels(names)
     if not kept:
         raise SignfaceError("none of the markers in the TRC file has a label", file=file, hint="label the markers")
-    start = float(rows.values(0, 1)[0, 1])
     return marker_rows(
         rows,
         np.array(kept)[:, None] * 3 + np.arange(2, 5),
         labels,
-        rate,
+        clock,
         units=fields.get("units"),
         unit=unit,
-        start=start if math.isfinite(start) else 0.0,
-        history=(f"read {file.name} (TRC)", *notes),
+        history=(f"read {file.name} (TRC)", *doubts, *([note] if note else []), *notes),
     )
