@@ -123,7 +123,8 @@ def read_pose(path: str | PathLike[str], *, unit: str | None = None, subject: st
 
     Works with the 468, the 478 (with irises) and the 128-point (contours) sets. A landmark is missing where its
     confidence is 0, or all its coordinates are. People are followed by where they are, whatever their index
-    (`people.followed`). The scale is one number for the whole take: nearer and farther from the camera remain visible as growing and shrinking.
+    (`people.followed`). The scale is one number for the
+    whole take: nearer and farther from the camera remain visible as growing and shrinking.
 
     Parameters
     ----------
