@@ -5,7 +5,8 @@ from .corpus.manifest import Corpus, read_corpus
 from .corpus.running import run_corpus
 from .descriptors import Descriptors
 from .descriptors_files import read_weights, write_weights
-from .elan.reference import read_reference, read_tiers
+from .elan.annotators import read_tiers
+from .elan.reference import read_reference
 from .elan.vocabularies import read_vocabulary
 from .elan.writing import write_eaf
 from .errors import SignfaceError, SignfaceWarning

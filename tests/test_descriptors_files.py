@@ -17,7 +17,7 @@ from signface.cli.main import main
 from signface.columns import POSE
 from signface.descriptors import Descriptors
 from signface.descriptors_files import WeightsWriter, read_weights, write_weights
-from signface.elan.reference import read_tiers
+from signface.elan.annotators import read_tiers
 from signface.errors import SignfaceError
 from signface.settings.solve import SolveSettings
 from signface.takes.formats.c3d import write_c3d

@@ -23,6 +23,7 @@ EXAMPLE = """  signface elan check corrected/*.eaf
   signface elan map annotated/*.eaf -o mapping.toml
   signface elan learn corpora/mine -o mine.skops
   signface elan agree eva.eaf tom.eaf -o agreement/
+  signface elan agree both.eaf --tier brows_R1 --tier brows_R2
   signface elan table annotated/*.eaf -o annotations.csv
   signface elan install-recogniser --elan /opt/ELAN_7-0"""
 
@@ -80,11 +81,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "agreement between annotators, or between one and the machine",
         "signface elan agree eva.eaf tom.eaf machine.eaf -o agreement/",
     )
-    agree.add_argument("files", nargs="+", type=Path, metavar="EAF", help="two or more files of one take")
+    agree.add_argument(
+        "files", nargs="+", type=Path, metavar="EAF", help="files of one take, or one that holds all annotators"
+    )
     agree.add_argument(
         "--tier", action="append", default=[], metavar="NAME",
-        help="a tier of every file; may be repeated (default: all independent tiers that every file has)",
+        help="a tier of every file, or one of several of one file; may be repeated (default: all independent ones "
+        "that every file has)",
     )  # fmt: skip
+    agree.add_argument(
+        "--match", choices=("name", "prefix", "suffix", "participant"), default="name",
+        help="where the annotator stands in the names of tiers; name: an annotator is a file (default: %(default)s)",
+    )  # fmt: skip
+    agree.add_argument(
+        "--separator", default="_", metavar="TEXT",
+        help="what parts prefix or suffix from the rest of a tier's name (default: %(default)s)",
+    )  # fmt: skip
+    agree.add_argument(
+        "--video",
+        type=Path,
+        metavar="FILE",
+        help="the film whose clock counts, where those linked begin at other times",
+    )
     agree.add_argument(
         "--overlap", type=float, default=0.6, metavar="SHARE",
         help="share of the longer annotation that must overlap for a match (default: %(default)s)",
@@ -174,7 +192,7 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
     card = read_card(arguments.before)
     vocabulary = card.vocabulary.without_blank()
     corpus = read_corpus(arguments.corpus)
-    files = [(entry.annotation, entry.signer) for entry in corpus if entry.annotation is not None]
+    files = [(entry.annotation, entry.signer, entry.video) for entry in corpus if entry.annotation is not None]
     tables = corpus_corrections(files, tier=card.tier, vocabulary=vocabulary, mapping=arguments.mapping)
     for line in compare_corrections(tables):
         print(line)
@@ -218,14 +236,25 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
 
 def compare_annotators(arguments: argparse.Namespace) -> None:
     """Print the agreement on every tier; write tables and pictures when asked."""
-    from signface.elan.reference import read_annotators
+    from signface.elan.annotators import read_annotators
     from signface.metrics.tiers import compare_tiers, renamed
 
-    annotators = read_annotators(arguments.files, mapping=arguments.mapping)
     same = {old: str(new) for pairs in arguments.same for old, new in pairs.items()}
+    asked = [*arguments.tier, *(old for old, new in same.items() if new in arguments.tier)]
+    annotators = read_annotators(
+        arguments.files,
+        mapping=arguments.mapping,
+        tiers=asked,
+        match=arguments.match,
+        separator=arguments.separator,
+        video=arguments.video,
+    )
     if same:
         annotators = renamed(annotators, same)
-    agreements = compare_tiers(annotators, tiers=arguments.tier, overlap=arguments.overlap, gamma=arguments.gamma)
+    in_one = arguments.match == "name" and len(arguments.files) == 1  # each tier is an annotator's
+    agreements = compare_tiers(
+        annotators, tiers=() if in_one else arguments.tier, overlap=arguments.overlap, gamma=arguments.gamma
+    )
     first, second = list(annotators)[:2]
     for agreement in agreements:
         columns = agreement.table.drop(columns="tier").dropna(axis=1, how="all")

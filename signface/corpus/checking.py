@@ -266,7 +266,8 @@ def _problems_of_markers(entry: TakeEntry, recipe: Recipe, take: Take) -> list[s
 
 def _problems_of_reference(check: TakeCheck, span: tuple[float, float] | None) -> list[str]:
     """What is wrong with a reference annotation, by itself and beside its take (start and end in seconds)."""
-    from signface.elan.reference import read_reference, read_tiers, reference_vocabulary
+    from signface.elan.annotators import read_tiers
+    from signface.elan.reference import read_reference, reference_vocabulary
     from signface.label.vocabulary import AFFECT, NONE, Vocabulary
 
     entry, tier, mapping = check.entry, check.tier, check.mapping
@@ -289,7 +290,9 @@ def _problems_of_reference(check: TakeCheck, span: tuple[float, float] | None) -
             vocabulary = vocabulary.including(NONE)
         foreign = [label for label in annotated if vocabulary is not None and label not in vocabulary.allowed]
         try:
-            reference = read_reference(file, entry.signer, tier=tier, vocabulary=vocabulary, mapping=mapping)
+            reference = read_reference(
+                file, entry.signer, tier=tier, vocabulary=vocabulary, mapping=mapping, video=entry.video
+            )
         except SignfaceError:
             if not foreign:
                 raise
@@ -300,7 +303,9 @@ def _problems_of_reference(check: TakeCheck, span: tuple[float, float] | None) -
                 + ("; transitions join two of them, as NA" if vocabulary == AFFECT else "")
             )
             said = Vocabulary("annotated", annotated)
-            reference = read_reference(file, entry.signer, tier=tier, vocabulary=said, mapping=mapping)
+            reference = read_reference(
+                file, entry.signer, tier=tier, vocabulary=said, mapping=mapping, video=entry.video
+            )
     except SignfaceError as error:
         return [*problems, str(error) if error.file is not None else f"{file}: {error}"]
     table = reference.table

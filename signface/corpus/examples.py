@@ -143,7 +143,7 @@ def _references(
     readable = vocabulary.including(NONE) if blank else vocabulary
     kept = []
     for entry, (file, signer) in zip([entry for entry in entries if entry.annotation is not None], files, strict=True):
-        reference = read_reference(file, signer, tier=tier, vocabulary=readable, mapping=mapping)
+        reference = read_reference(file, signer, tier=tier, vocabulary=readable, mapping=mapping, video=entry.video)
         if blank:  # what is called none is what is not annotated: one segment with the gaps beside it
             shown = reference.table[reference.table["label"] != NONE].reset_index(drop=True)
             kept.append(

@@ -19,7 +19,8 @@ from pathlib import Path
 
 from lxml import etree
 
-from signface.elan.document import NAMES, parent_annotations, read_document
+from signface.elan.document import NAMES, read_document
+from signface.elan.times import parent_annotations
 from signface.errors import SignfaceError
 
 

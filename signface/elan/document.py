@@ -22,6 +22,7 @@ from pathlib import Path, PurePath, PureWindowsPath
 
 from lxml import etree
 
+from signface.elan.times import annotation_spans
 from signface.errors import SignfaceError
 from signface.files import reading, whole_file
 
@@ -302,43 +303,17 @@ def recorded(root: etree._Element) -> dict[str, list[Row]]:
     return records
 
 
-def parent_annotations(root: etree._Element) -> dict[str | None, str | None]:
-    """The annotation that each dependent one hangs on, by their identifiers."""
-    dependents = root.iterfind("TIER/ANNOTATION/REF_ANNOTATION")
-    return {annotation.get("ANNOTATION_ID"): annotation.get("ANNOTATION_REF") for annotation in dependents}
-
-
 def tier_rows(root: etree._Element) -> dict[str, list[Row]]:
     """Every tier's annotations as (start, end, value), milliseconds, in the order of time.
 
-    A dependent annotation has the times of the annotation it hangs on; a time that the file leaves open is None.
+    Times that the file leaves open are those that ELAN gives them (`times.annotation_spans`).
     Annotations whose references dangle have no times; `checking.check_document` names them.
     """
-    times = {
-        slot.get("TIME_SLOT_ID"): int(slot.get("TIME_VALUE"))
-        for slot in root.iterfind("TIME_ORDER/TIME_SLOT")
-        if slot.get("TIME_VALUE") is not None
-    }
-    spans: dict[str | None, tuple[int | None, int | None]] = {
-        annotation.get("ANNOTATION_ID"): (
-            times.get(annotation.get("TIME_SLOT_REF1")),
-            times.get(annotation.get("TIME_SLOT_REF2")),
-        )
-        for annotation in root.iterfind("TIER/ANNOTATION/ALIGNABLE_ANNOTATION")
-    }
-    parents = parent_annotations(root)
-
-    def span(identifier: str | None) -> tuple[int | None, int | None]:
-        seen = set()
-        while identifier in parents and identifier not in seen:  # a ring of references must not hang the reader
-            seen.add(identifier)
-            identifier = parents[identifier]
-        return spans.get(identifier, (None, None))
-
+    spans = annotation_spans(root)
     rows: dict[str, list[Row]] = {}
     for tier in root.iterfind("TIER"):
         annotations = [
-            (*span(annotation.get("ANNOTATION_ID")), annotation.findtext("ANNOTATION_VALUE") or "")
+            (*spans.get(annotation.get("ANNOTATION_ID"), (None, None)), annotation.findtext("ANNOTATION_VALUE") or "")
             for annotation in tier.iterfind("ANNOTATION/*")
         ]
         annotations.sort(key=lambda row: (row[0] is None, row[0] or 0, row[1] or 0))

@@ -83,10 +83,11 @@ def curve_files(root: etree._Element, file: Path) -> tuple[tuple[Path, ...], str
     return (curves, description), None
 
 
-def link_curves(header: etree._Element, files: Sequence[Path], file: Path) -> bool:
+def link_curves(header: etree._Element, files: Sequence[Path], file: Path, *, origin_ms: int = 0) -> bool:
     """Link the curves and their description, in place of those that we linked under another name or in another folder.
 
-    `.xml` is linked as text/xml, anything else as text/plain.
+    `.xml` is linked as text/xml, anything else as text/plain. `origin_ms` is where the annotations' time 0 lies in the
+    curves, which are in the film's clock.
 
     Returns
     -------
@@ -116,6 +117,8 @@ def link_curves(header: etree._Element, files: Sequence[Path], file: Path) -> bo
         before = dict(element.attrib)
         _set(element, LINK, absolute, relative)
         element.set("MIME_TYPE", mime)
+        if origin_ms and ending != TSCONF and element.get("TIME_ORIGIN") is None:
+            element.set("TIME_ORIGIN", str(origin_ms))
         changed |= before != dict(element.attrib)
         kept.append(element)
     for link in ours:

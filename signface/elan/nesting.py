@@ -12,8 +12,8 @@ from lxml import etree
 
 from signface.elan.document import named, recorded, tier_rows
 from signface.elan.mapping import ChannelRule, Mapping, stereotype
-from signface.elan.spans import annotation_spans
 from signface.elan.tiers import Tier, clean_name
+from signface.elan.times import annotation_spans
 from signface.errors import SignfaceWarning
 from signface.label.vocabulary import AFFECT
 

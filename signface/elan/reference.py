@@ -1,7 +1,7 @@
 """What annotators wrote, as tables.
 
 - `read_reference`: the affect tier of a signer, or another one, as segments; `reference_vocabulary`: of a corpus.
-- `read_tiers`: every independent tier; `read_annotators`: those of several files, under short names.
+- `rows_table`: annotations as a table of seconds; `annotation_root`: the document of any file of annotations.
 - `read_corrections`: a tier as signface wrote it, and as it is now.
 """
 
@@ -11,7 +11,6 @@ import difflib
 import json
 import warnings
 from collections.abc import Iterable, Sequence
-from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 
@@ -19,11 +18,11 @@ import numpy as np
 import pandas as pd
 from lxml import etree
 
-from signface.elan.checking import check_document
 from signface.elan.document import CHANNEL_PREFIX, Row, read_document, recorded, tier_rows
 from signface.elan.frame_labels import frame_label_document, is_frame_labels
 from signface.elan.tiers import clean_name, tier_name
-from signface.elan.translation import MappingOrFile, as_mapping, tier_meanings, translated
+from signface.elan.times import film_origin
+from signface.elan.translation import MappingOrFile, as_mapping, tier_meanings
 from signface.elan.vocabularies import vocabulary_of_tier
 from signface.errors import SignfaceError, SignfaceWarning
 from signface.label.vocabulary import AFFECT, INTENSITY, NONE, UNKNOWN, Vocabulary
@@ -37,6 +36,7 @@ def read_reference(
     tier: str = "affect",
     vocabulary: Vocabulary | None = None,
     mapping: MappingOrFile | None = None,
+    video: str | PathLike[str] | None = None,
 ) -> Segments:
     """Read the reference annotation of one signer.
 
@@ -55,21 +55,25 @@ def read_reference(
     mapping : mapping or path, optional
         Of our channels and labels to the laboratory's tiers and values (`signface.elan.mapping`): `tier` is then ours,
         and so are the labels returned.
+    video : path, optional
+        The film whose clock the times are of, where the file links several that begin at different times
+        (`signface.elan.times.film_origin`).
 
     Returns
     -------
     Segments
-        `start_s, end_s, kind, label`; `intensity` (1, 2, 3 or missing) where a tier `intensity@SIGNER` exists.
+        `start_s, end_s, kind, label` in the clock of the film: annotation time and `TIME_ORIGIN`;
+        `intensity` (1, 2, 3 or missing) where a tier `intensity@SIGNER` exists.
         Annotations without a value are left out, and those in which a model abstained (`unknown`). Missing time
-        values, which ELAN allows within a chain of annotations, are spread evenly between the known ones. A lab's
+        values are those that ELAN gives (`signface.elan.times.annotation_spans`). A lab's
         values are turned back into labels. Where the vocabulary has no transitions, every annotation is a stable
         segment, and two of one label that touch are one segment; the history says how many there were.
 
     Raises
     ------
     SignfaceError
-        The file is no EAF, the tier is missing, annotations overlap or have no time, or a label is outside the
-        vocabulary.
+        The file is no EAF, the tier is missing, annotations overlap or have no time, a label is outside the
+        vocabulary, or films begin at different times and none is named.
 
     See Also
     --------
@@ -88,10 +92,9 @@ def read_reference(
     4    5.160  5.922      stable     N       <NA>
     """
     file = Path(eaf)
-    root = _root(file)
+    root = annotation_root(file)
     meanings = _meanings(root, mapping)
     name = _tier_name(root, tier, signer, file, meanings)
-    _fill_times(root)
     tiers = tier_rows(root)
     meaning = meanings[name][2] if name in meanings else {}
     if vocabulary is None:
@@ -101,7 +104,7 @@ def read_reference(
     if not vocabulary.transitions and (merged := _merged(rows)) != rows:
         history.append(f"merged {len(rows)} annotations into {len(merged)}: equal ones touched")
         rows = merged
-    table = _table(rows)
+    table = rows_table(rows, film_origin(root, file, video))
     moving = [vocabulary.is_transition(label) for label in table["label"]]
     table.insert(2, "kind", np.where(np.array(moving, dtype=bool), "transition", "stable").astype(object))
     intensity_name = "intensity" + name.removeprefix("affect")
@@ -138,7 +141,7 @@ def reference_vocabulary(
     mapping = as_mapping(mapping)
     for eaf, signer in files:
         file = Path(eaf)
-        root = _root(file)
+        root = annotation_root(file)
         meanings = _meanings(root, mapping)
         name = _tier_name(root, tier, signer, file, meanings)
         meaning = meanings[name][2] if name in meanings else {}
@@ -161,49 +164,6 @@ def reference_vocabulary(
     return Vocabulary(tier.partition("@")[0], tuple(sorted(labels)))
 
 
-def read_tiers(eaf: str | PathLike[str]) -> dict[str, pd.DataFrame]:
-    """Every tier that hangs on no other, as a table `start_s, end_s, label`; annotations without a value left out.
-
-    Raises
-    ------
-    SignfaceError
-        The file is no EAF, or is broken (`checking.check_document`).
-
-    See Also
-    --------
-    signface.read_reference : the affect tier, checked.
-
-    Examples
-    --------
-    >>> import signface as sf
-    >>> file = sf.datasets.mini_file().with_name("reference") / "M2_EU_04.eaf"
-    >>> for name, table in sf.read_tiers(file).items():
-    ...     print(name, len(table))
-    affect@M2 5
-    """
-    file = Path(eaf)
-    root = _root(file)
-    check_document(root, file)
-    _fill_times(root)
-    rows = tier_rows(root)
-    independent = [tier.get("TIER_ID") or "" for tier in root.iterfind("TIER") if tier.get("PARENT_REF") is None]
-    return {name: _table([row for row in rows[name] if row[2].strip()]) for name in independent}
-
-
-def read_annotators(
-    files: Sequence[str | PathLike[str]], *, mapping: MappingOrFile | None = None
-) -> dict[str, dict[str, pd.DataFrame]]:
-    """The tiers of several annotators' files of one take; errors are those of `read_tiers`.
-
-    Each stands under the stem of its file, or under its path where two stems are equal; with our names of tiers and
-    labels where a mapping gives them (`signface.elan.translation.translated`).
-    """
-    stems = [Path(file).stem for file in files]
-    names = stems if len(set(stems)) == len(stems) else [str(file) for file in files]
-    annotators = {name: read_tiers(file) for name, file in zip(names, files, strict=True)}
-    return annotators if mapping is None else translated(annotators, mapping)
-
-
 def read_corrections(
     eaf: str | PathLike[str],
     signer: str | None = None,
@@ -211,6 +171,7 @@ def read_corrections(
     tier: str = "affect",
     vocabulary: Vocabulary | None = None,
     mapping: MappingOrFile | None = None,
+    video: str | PathLike[str] | None = None,
 ) -> tuple[pd.DataFrame, pd.DataFrame] | None:
     """A tier as signface wrote it and as it is now: two tables `start_s, end_s, label`.
 
@@ -218,30 +179,34 @@ def read_corrections(
     those of `read_reference`.
     """
     file = Path(eaf)
-    root = _root(file)
+    root = annotation_root(file)
     meanings = _meanings(root, mapping)
     name = _tier_name(root, tier, signer, file, meanings)
     written = recorded(root).get(name)
     if written is None:
         return None
     meaning = meanings[name][2] if name in meanings else {}
-    before = _table([(start, end, meaning.get(value, value)) for start, end, value in written])
+    rows = [(start, end, meaning.get(value, value)) for start, end, value in written]
+    before = rows_table(rows, film_origin(root, file, video))
     wide = AFFECT if vocabulary is None and tier == "affect" else vocabulary
     wide = None if wide is None else wide.including(UNKNOWN)  # what a model did not know is there to be corrected
-    after = read_reference(file, signer, tier=tier, vocabulary=wide, mapping=mapping).table
+    after = read_reference(file, signer, tier=tier, vocabulary=wide, mapping=mapping, video=video).table
     return before, after[["start_s", "end_s", "label"]]
 
 
 def corpus_corrections(
-    files: Sequence[tuple[str | PathLike[str], str | None]],
+    files: Sequence[tuple[str | PathLike[str], str | None, str | PathLike[str] | None]],
     *,
     tier: str = "affect",
     vocabulary: Vocabulary | None = None,
     mapping: MappingOrFile | None = None,
 ) -> list[tuple[pd.DataFrame, pd.DataFrame] | None]:
-    """`read_corrections` of each annotation of a corpus, with its signer."""
+    """`read_corrections` of each annotation of a corpus, with its signer and its film."""
     rules = None if mapping is None else as_mapping(mapping)
-    return [read_corrections(f, signer, tier=tier, vocabulary=vocabulary, mapping=rules) for f, signer in files]
+    return [
+        read_corrections(file, signer, tier=tier, vocabulary=vocabulary, mapping=rules, video=video)
+        for file, signer, video in files
+    ]
 
 
 def channel_labels(root: etree._Element) -> dict[str, tuple[str, dict[str, str]]]:
@@ -271,14 +236,18 @@ def _meanings(root: etree._Element, mapping: MappingOrFile | None) -> dict[str, 
     return written | tier_meanings(as_mapping(mapping), tiers)
 
 
-def _root(file: Path) -> etree._Element:
+def annotation_root(file: Path) -> etree._Element:
     """The document of an annotation, whichever file holds it."""
     return frame_label_document(file) if is_frame_labels(file) else read_document(file).getroot()
 
 
-def _table(rows: Iterable[Row]) -> pd.DataFrame:
-    """Rows as a table in seconds, without those whose time is unknown."""
-    known = [(start / 1000, end / 1000, label) for start, end, label in rows if start is not None and end is not None]
+def rows_table(rows: Iterable[Row], origin: int) -> pd.DataFrame:
+    """Rows as a table in seconds of the film, without those whose time is unknown; `origin` in milliseconds."""
+    known = [
+        ((start + origin) / 1000, (end + origin) / 1000, label)
+        for start, end, label in rows
+        if start is not None and end is not None
+    ]
     table = pd.DataFrame(known, columns=["start_s", "end_s", "label"])
     return table.astype({"start_s": float, "end_s": float, "label": object})
 
@@ -366,20 +335,6 @@ def _tier_hint(wanted: str, tiers: list[str]) -> str:
     if close:
         return f"did you mean {close[0]}? {hint[0].upper()}{hint[1:]}"
     return f"{hint}; another tier: --tier NAME" if wanted == "affect" else hint
-
-
-def _fill_times(root: etree._Element) -> None:
-    """Spread time slots without a value evenly between their neighbours, as ELAN draws them.
-
-    TIME_ORDER lists the slots in the order of time, so the neighbours in the file bound an unknown one. Only the
-    tree in memory changes.
-    """
-    slots = root.findall("TIME_ORDER/TIME_SLOT")
-    known = [i for i, slot in enumerate(slots) if slot.get("TIME_VALUE") is not None]
-    for before, after in pairwise(known):
-        start, end = int(slots[before].get("TIME_VALUE")), int(slots[after].get("TIME_VALUE"))
-        for i in range(before + 1, after):
-            slots[i].set("TIME_VALUE", str(start + (end - start) * (i - before) // (after - before)))
 
 
 def _intensities(rows: list[tuple[int, int, str]], annotated: list[Row], name: str, file: Path) -> pd.Series:

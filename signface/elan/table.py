@@ -16,8 +16,8 @@ import pandas as pd
 from lxml import etree
 
 from signface.elan.checking import find_problems
-from signface.elan.document import parent_annotations, read_document
-from signface.elan.spans import Span, annotation_spans
+from signface.elan.document import read_document
+from signface.elan.times import Span, annotation_spans, parent_annotations
 from signface.errors import SignfaceError, SignfaceWarning
 from signface.files import whole_file
 from signface.progress import progress
@@ -42,7 +42,7 @@ def annotation_table(files: Sequence[str | PathLike[str]], *, tiers: Sequence[st
         (linguistic type), `annotation` (its identifier), `start_s, end_s, value`; then `parent_tier, parent_value` of
         the annotation it hangs on, or in which it lies, `parent_tier_2, parent_value_2` of that one's, and so on as
         deep as the files go. Times are ELAN's, seconds from its own zero; annotations without times have those that
-        ELAN shows (`signface.elan.spans`), and missing ones where the file leaves them open.
+        ELAN shows (`signface.elan.times`), and missing ones where the file leaves them open.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def _rows(root: etree._Element, file: str, wanted: Sequence[str]) -> list[dict[s
     return rows
 
 
-def _parents(root: etree._Element, spans: dict[str, Span]) -> dict[str | None, str | None]:
+def _parents(root: etree._Element, spans: dict[str | None, Span]) -> dict[str | None, str | None]:
     """What each annotation hangs on; for those with times of their own the one of the parent tier in which they lie."""
     parents = parent_annotations(root)
     tiers = {tier.get("TIER_ID"): tier for tier in root.iterfind("TIER")}

@@ -3,6 +3,7 @@
 - `Tier`: a time-aligned tier and the tiers that depend on it by symbolic association.
 - `milliseconds`: seconds to the whole milliseconds of EAF, without gaps, overlaps or empty annotations appearing.
 - `label_tier`: the tiers `affect@SIGNER`, `affect-confidence@SIGNER` and `intensity@SIGNER` from labelled segments.
+- `in_annotation_time`: a tier of the film in a document that begins later or earlier than the film.
 - `doubtful_tier`: the segments whose confidence is low, on a tier of their own.
 """
 
@@ -10,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
@@ -190,6 +191,35 @@ def doubtful_tier(
         low |= ((table["start_s"] < one.end_s) & (table["end_s"] > one.start_s)).to_numpy(bool)
     labels = tuple(str(label) for label in table["label"][low])
     return Tier(f"{channel}-doubtful", signer, start_ms[low], end_ms[low], labels, vocabulary)
+
+
+def in_annotation_time(tier: Tier, origin_ms: int) -> Tier:
+    """A tier in the clock of the film as it stands in a document whose time 0 is `origin_ms` in the film.
+
+    What lies before that is left out, and an annotation that contains it begins there.
+
+    Examples
+    --------
+    >>> tier = Tier("brows", "", np.array([0, 800, 2000]), np.array([500, 1500, 2500]), ("up", "down", "up"))
+    >>> moved = in_annotation_time(tier, 1000)
+    >>> moved.start_ms.tolist(), moved.end_ms.tolist(), moved.values
+    ([0, 1000], [500, 1500], ('down', 'up'))
+    """
+    if not origin_ms:
+        return tier
+    start, end = tier.start_ms - origin_ms, tier.end_ms - origin_ms
+    kept = end > 0
+
+    def chosen(values: tuple) -> tuple:
+        return tuple(value for value, keep in zip(values, kept, strict=True) if keep)
+
+    return replace(
+        tier,
+        start_ms=start[kept].clip(min=0),
+        end_ms=end[kept],
+        values=chosen(tier.values),
+        dependents=tuple(replace(child, values=chosen(child.values)) for child in tier.dependents),
+    )
 
 
 def _after_time_0(segments: Segments, vocabulary: Vocabulary) -> tuple[pd.DataFrame, np.ndarray, np.ndarray]:

@@ -87,7 +87,7 @@ def translated(
     Parameters
     ----------
     annotators : mapping
-        Of each annotator the tables `start_s, end_s, label` by tier (`signface.elan.reference.read_annotators`).
+        Of each annotator the tables `start_s, end_s, label` by tier (`signface.elan.annotators.read_annotators`).
     mapping : mapping or path
 
     Raises

@@ -45,7 +45,8 @@ from signface.elan.links import curve_files, link_curves, link_media, warn_of_cu
 from signface.elan.mapping import read_mapping
 from signface.elan.merging import put_tiers
 from signface.elan.preferences import write_preferences
-from signface.elan.tiers import Tier, xml_text
+from signface.elan.tiers import Tier, in_annotation_time, xml_text
+from signface.elan.times import film_origin
 from signface.elan.upgrade import is_before_28, upgrade
 from signface.errors import SignfaceError
 from signface.label.vocabulary import Vocabulary
@@ -95,7 +96,7 @@ def write_eaf(
         Names the tiers and is their participant; the annotation's own signer when not given. Empty for tiers without
         `@`.
     video : path or URL, optional
-        The media file that the annotations belong to.
+        The media file that the annotations belong to, whose `TIME_ORIGIN` in the document counts.
     tier : str, optional
         What the segments are of: the part of the tier's name before `@`. The annotation's own when not given, and
         `affect` for segments alone.
@@ -128,11 +129,6 @@ def write_eaf(
     SignfaceWarning
         ELAN will not show the curves, or not for ever; preferences, or a vocabulary in another file, cannot be read;
         annotations end at the edges of those of a lab's parent tier.
-
-    See Also
-    --------
-    signface.annotation.annotate : finds what is written.
-    signface.elan.reference.read_reference : reads it back.
 
     Examples
     --------
@@ -180,10 +176,12 @@ def prepare(
         root.set("AUTHOR", xml_text(options.author))
     else:
         root, old = _read_upgraded(file)
+    origin = film_origin(root, file, video)
     all_tiers, curves, facts, segments = contents_of(
         annotation, options, signer=signer, tier=tier, vocabulary=vocabulary
     )
     facts |= properties or {}
+    all_tiers = tuple(in_annotation_time(one, origin) for one in all_tiers)
     rules = {} if options.mapping is None else read_mapping(options.mapping)
     links: tuple[Path, ...] = ()
     if curves is not None:
@@ -195,7 +193,7 @@ def prepare(
     if video is not None:
         changed |= link_media(header, video, file)
     if links:
-        changed |= link_curves(header, links, file)
+        changed |= link_curves(header, links, file, origin_ms=origin)
     if changed or into is None:
         root.set("DATE", iso_date(date))
         _say_what_wrote(root, segments, facts)

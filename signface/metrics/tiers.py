@@ -52,7 +52,7 @@ def compare_tiers(
     ----------
     annotators : mapping
         Name of an annotator, and the tiers: name and table `start_s, end_s, label`
-        (`signface.elan.reference.read_annotators`).
+        (`signface.elan.annotators.read_annotators`).
     tiers : sequence of str
         Which tiers; by default all that everybody has and somebody has filled.
     overlap : float
@@ -75,7 +75,9 @@ def compare_tiers(
     1.0
     """
     if len(annotators) < 2:
-        raise SignfaceError("agreement needs two files or more", hint="name the files of two annotators")
+        raise SignfaceError(
+            "agreement needs two files or more", hint="name the files of two annotators, or two tiers of one"
+        )
     first = next(iter(annotators.values()))
     common = [tier for tier in first if all(tier in theirs for theirs in annotators.values())]
     wanted = list(tiers) or [tier for tier in common if any(len(theirs[tier]) for theirs in annotators.values())]

@@ -16,8 +16,9 @@ from signface.annotation import annotate
 from signface.cli.main import main
 from signface.corpus.examples import solve_corpus
 from signface.corpus.manifest import read_corpus, write_takes
+from signface.elan.annotators import read_tiers
 from signface.elan.document import read_document
-from signface.elan.reference import read_reference, read_tiers
+from signface.elan.reference import read_reference
 from signface.elan.vocabularies import read_vocabulary, write_vocabulary
 from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError, SignfaceWarning

@@ -8,8 +8,8 @@ from lxml import etree
 
 from signface.cli.main import main
 from signface.elan.document import read_document
-from signface.elan.spans import annotation_spans
 from signface.elan.table import annotation_table
+from signface.elan.times import annotation_spans
 from signface.elan.writing import write_eaf
 from signface.errors import SignfaceError, SignfaceWarning
 from tests.elan.test_templates import LAB

@@ -192,7 +192,7 @@ def test_a_corrected_tier_is_kept_unless_asked_otherwise(lab):
 
 def test_a_moved_boundary_is_a_correction_too(lab):
     write_eaf(labelled(), into=lab, signer="S1")
-    moved = lab.read_text("utf-8").replace('TIME_VALUE="2500"', 'TIME_VALUE="2400"')
+    moved = lab.read_text("utf-8").replace('TIME_VALUE="2460"', 'TIME_VALUE="2400"')
     lab.write_text(moved, "utf-8")
     with pytest.raises(SignfaceError, match="corrected since"):
         write_eaf(labelled("A AN N"), into=lab, signer="S1")
@@ -245,9 +245,9 @@ def test_labels_become_the_labs_values_on_the_labs_tiers(lab, mapping):
     write_eaf(labelled(), into=lab, signer="S1", options=mapping)
     assert_valid(lab)
     assert [row[:3] for row in read_back(lab, "Emotion_S1")] == [
-        (0, 500, "neutral"),
-        (1000, 1500, "Freude"),
-        (2000, 2500, "neutral"),
+        (0, 460, "neutral"),  # the film is 40 ms ahead of the annotations
+        (960, 1460, "Freude"),
+        (1960, 2460, "neutral"),
     ]
     assert [row[2] for row in read_back(lab, "Certainty_S1")] == ["0.90", "0.70", "0.50"]
     annotation = etree.parse(lab).getroot().find("TIER[@TIER_ID='Emotion_S1']/ANNOTATION[2]/ALIGNABLE_ANNOTATION")
@@ -447,7 +447,7 @@ def test_a_labs_tier_that_has_the_name_of_ours_is_not_ours(tmp_path):
     assert "--signer" not in str(refused.value)
     rules = {"brows": ChannelRule("brows@{signer}")}
     write_eaf(found, into=path, options=mapped(tmp_path, rules, curves=False))
-    assert [row[:3] for row in read_back(path, "brows@S1")] == [(500, 1000, "raised")]
+    assert [row[:3] for row in read_back(path, "brows@S1")] == [(460, 960, "raised")]
 
 
 def test_a_tier_of_ours_stays_ours_after_others_have_written_the_file(tmp_path):
