@@ -7,11 +7,14 @@ Each command is a module of this folder with `EXAMPLE` (shown under its help), `
 from __future__ import annotations
 
 import argparse
+import difflib
 import importlib
 import os
+import re
 import sys
 import warnings
 from collections.abc import Sequence
+from typing import NoReturn
 
 from signface.compiling import on_compiling
 from signface.errors import SignfaceError, SignfaceWarning
@@ -35,9 +38,28 @@ COMMANDS = {
 }
 
 
+class Parser(argparse.ArgumentParser):
+    """A parser, and those of its subcommands, that says which word was probably meant."""
+
+    def error(self, message: str) -> NoReturn:
+        """Leave with status 2."""
+        wrong = re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)", message)
+        unknown = re.search(r"unrecognized arguments: (--[^ =]+)", message)
+        choices = re.findall(r"[^\s,']+", wrong[2]) if wrong else _options(self) if unknown else []
+        found = wrong or unknown
+        close = difflib.get_close_matches(found[1], choices, n=1) if found else []
+        super().error(f"{message}. Did you mean {close[0]}?" if close else message)
+
+
+def _options(parser: argparse.ArgumentParser) -> list[str]:
+    """The options of a parser and of its subcommands."""
+    below = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
+    return [*parser._option_string_actions, *(o for a in below for p in a.choices.values() for o in _options(p))]
+
+
 def build_parser(command: str | None) -> argparse.ArgumentParser:
     """The parser; only `command` has its arguments filled in."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="signface",
         description="Annotate the faces of signers: from a recording to tiers in ELAN.",
         epilog="example: signface annotate take.c3d -o take.eaf\n\nsignface COMMAND --help says more of a command.",

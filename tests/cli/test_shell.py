@@ -47,6 +47,28 @@ def test_an_unknown_command_is_named(capsys):
     assert "anotate" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("line", "meant"),
+    [
+        (["anotate"], "annotate"),
+        (["study", "analyze"], "analyse"),
+        (["evaluate", "corpus", "-o", "report", "--protocol", "acros"], "across"),
+        (["study", "analyse", "answers.csv", "--resample5", "200"], "--resamples"),
+    ],
+)
+def test_a_word_that_is_nearly_right_is_answered_with_the_right_one(line, meant, capsys):
+    with pytest.raises(SystemExit) as left:
+        main(line)
+    assert left.value.code == 2
+    assert f"Did you mean {meant}?" in capsys.readouterr().err
+
+
+def test_a_word_like_no_other_is_answered_without_a_guess(capsys):
+    with pytest.raises(SystemExit):
+        main(["zzz"])
+    assert "Did you mean" not in capsys.readouterr().err
+
+
 def test_what_a_user_can_mend_is_one_line_without_traceback(tmp_path, capsys):
     status = main(["take", "info", str(tmp_path / "missing.c3d")])
     shown = capsys.readouterr().err
