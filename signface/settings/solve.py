@@ -28,7 +28,7 @@ METHODS = {
 }
 
 #: What is said of a take and not of how takes are solved.
-OF_THE_TAKE = ("subject", "cut_from", "cut_to", "offset_s", "film_timecode")
+OF_THE_TAKE = ("subject", "join", "cut_from", "cut_to", "offset_s", "film_timecode")
 
 
 @dataclass(frozen=True)
@@ -119,6 +119,9 @@ class SolveSettings(Settings):
     subject: str | None = option(
         None, help="whose markers, of several signers in one recording (signface take info names them)", metavar="NAME"
     )
+    join: tuple[str, ...] = option(
+        (), help="markers that the file has in parts, NAME=PART+PART,...: LBROI=LBROI+M12", kind=tuple, metavar="PARTS"
+    )
     cut_from: str | None = option(
         None, help="only from this time on: seconds or [H:]M:S, as in the EAF", flag="--from", metavar="TIME"
     )
@@ -139,6 +142,10 @@ class SolveSettings(Settings):
             if isinstance(value, (int, float)) and not isinstance(value, bool):
                 object.__setattr__(self, name, f"{value:.15g}")
         super().__post_init__()
+        for rule in self.join:
+            name, sign, parts = rule.partition("=")
+            if not (sign and name.strip() and all(part.strip() for part in parts.split("+"))):
+                raise SignfaceError(f"{rule!r} joins no markers", hint="write --join NAME=PART+PART")
         begin, end = self.cut_s
         if not begin < end:
             raise SignfaceError(f"nothing lies from {self.cut_from} to {self.cut_to}", hint="--from is before --to")

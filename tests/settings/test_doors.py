@@ -90,7 +90,8 @@ def test_a_setting_of_the_command_line_counts_before_the_laboratorys(tmp_path, i
     assert read_settings(file).solve == written
     parser = parser_of("solve", None)
     (option,) = (a for a in parser._actions if a.dest == f"solve_{item}")
-    words = [option.option_strings[0]] + ([] if option.nargs == 0 else [str(value)])
+    text = ",".join(value) if isinstance(value, tuple) else str(value)
+    words = [option.option_strings[0]] + ([] if option.nargs == 0 else [text])
     common = ["take.c3d", "-o", "w.csv"]
     assert settings_from(parser.parse_args([*common, *words]), SolveSettings) == written
     assert settings_from(parser.parse_args([*common, "--settings", str(file)]), SolveSettings) == written

@@ -114,6 +114,24 @@ def test_a_subject_that_is_not_there_is_named_with_those_who_are():
         selected(take_of(["Anna:NOSE", "Ben:NOSE"]), SolveSettings(subject="Cleo"))
 
 
+def test_parts_of_a_marker_are_joined_under_one_name():
+    positions = np.zeros((6, 3, 3))
+    positions[..., 0] = np.arange(6)[:, None]
+    positions[3:, 0] = positions[:3, 1] = np.nan
+    take = Take(positions, ("NOSE", "M12", "CHIN"), 100.0, name="t")
+    joined = selected(take, SolveSettings(join=("NOSE=NOSE+M12",)))
+    assert joined.labels == ("NOSE", "CHIN")
+    assert joined.positions[:, 0, 0].tolist() == [0, 1, 2, 3, 4, 5]
+    assert "joined NOSE and M12 as NOSE" in joined.history
+    with pytest.raises(SignfaceError, match="no marker M99"):
+        selected(take, SolveSettings(join=("NOSE=NOSE+M99",)))
+    positions[:, 2, 1] = 30
+    with pytest.raises(SignfaceError, match="two markers, not parts of NOSE"):
+        selected(Take(positions, take.labels, 100.0), SolveSettings(join=("NOSE=NOSE+CHIN",)))
+    with pytest.raises(SignfaceError, match="joins no markers"):
+        SolveSettings(join=("NOSE",))
+
+
 def test_unlabelled_points_have_no_label():
     kept, names, notes = clean_labels(["*1", "A", "Anna:*12", "", "unlabeled_7", "U_3", "B", "Unnamed"])
     assert kept == [1, 6]
