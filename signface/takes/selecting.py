@@ -92,7 +92,9 @@ def _joined(recording: Take | TakeFile, rule: str) -> Take | TakeFile:
     absent = [part for part in parts if part not in recording.labels]
     if absent:
         raise SignfaceError(
-            f"has no marker {absent[0]} to join as {name}", file=recording.name, hint="signface take info names them"
+            f"has no marker {absent[0]} to join as {name}",
+            file=recording.name,
+            hint="its markers are listed by: signface take info",
         )
     columns = [recording.labels.index(part) for part in parts]
     kept = [number for number in range(len(recording.labels)) if number not in columns[1:]]
