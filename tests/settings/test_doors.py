@@ -204,7 +204,7 @@ def recognised(laboratory, tmp_path) -> list[str]:
     }
     xml = "".join(f'<param name="{name}">{value}</param>' for name, value in parameters.items())
     document = f"<PARAM>{xml}</PARAM>".encode()
-    assert read_parameters(document)["take"] == str(parameters["take"])
+    assert read_parameters(document)[0]["take"] == str(parameters["take"])
     stdin = sys.stdin
     sys.stdin = io.TextIOWrapper(io.BytesIO(document))
     try:
