@@ -83,6 +83,8 @@ def add_settings_arguments(
             continue
         about = item.metadata
         flag = about["flag"] or f"--{item.name.replace('_', '-')}"
+        if flag in parser._option_string_actions:  # `train --rate` is another's; of a take it is `--take-rate` there
+            flag = f"--take-{flag.removeprefix('--')}"
         common: dict[str, Any] = {"dest": f"{kind.TABLE}_{item.name}", "default": argparse.SUPPRESS}
         common["help"] = about["help"] + _default_words(item)
         if about["kind"] is bool:

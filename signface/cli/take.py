@@ -24,6 +24,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     info.add_argument("takes", nargs="+", metavar="TAKE", help="a recording, in one of the formats of --formats")
     info.add_argument("--formats", action=_ListFormats, help="list the formats that signface reads, and leave")
     info.add_argument("--unit", help="unit of length of the files (mm, cm, m, in), where they say none or a wrong one")
+    info.add_argument(
+        "--rate",
+        type=float,
+        metavar="HZ",
+        help="frames per second of the recording, where it says none or wrong ones; every row is then a frame",
+    )
+    info.add_argument(
+        "--start", type=float, metavar="SECONDS", help="time of the recording's first frame, where it says another"
+    )
     info.add_argument("--subject", metavar="NAME", help="whose markers, of several signers in one recording")
     info.add_argument("--face", default="default", help="face whose layouts are tried (default: the shipped one)")
     info.add_argument("--json", action="store_true", help="print JSON, for scripts")
@@ -99,7 +108,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     described = []
     for file in arguments.takes:
-        recording = read_recording(file, unit=arguments.unit, subject=arguments.subject)
+        recording = read_recording(
+            file, unit=arguments.unit, rate=arguments.rate, start=arguments.start, subject=arguments.subject
+        )
         if isinstance(recording, Take):
             content = describe_take(recording)
             history = content.pop("history")

@@ -28,7 +28,7 @@ METHODS = {
 }
 
 #: What is said of a take and not of how takes are solved.
-OF_THE_TAKE = ("subject", "join", "cut_from", "cut_to", "offset_s", "film_timecode")
+OF_THE_TAKE = ("unit", "rate_hz", "start_s", "subject", "join", "cut_from", "cut_to", "offset_s", "film_timecode")
 
 
 @dataclass(frozen=True)
@@ -116,6 +116,17 @@ class SolveSettings(Settings):
         flag="--as",
         metavar="aus",
     )
+    unit: str | None = option(
+        None, help="unit of length of the recording (mm, cm, m, in), where it says none or a wrong one", metavar="U"
+    )
+    rate_hz: float | None = number(
+        help="frames per second of the recording, where it says none or wrong ones; every row is then a frame",
+        flag="--rate",
+        metavar="HZ",
+    )
+    start_s: float | None = number(
+        help="time of the recording's first frame, where it says another", flag="--start", metavar="SECONDS"
+    )
     subject: str | None = option(
         None, help="whose markers, of several signers in one recording (signface take info names them)", metavar="NAME"
     )
@@ -146,6 +157,10 @@ class SolveSettings(Settings):
             name, sign, parts = rule.partition("=")
             if not (sign and name.strip() and all(part.strip() for part in parts.split("+"))):
                 raise SignfaceError(f"{rule!r} joins no markers", hint="write --join NAME=PART+PART")
+        if self.rate_hz is not None and not 0 < self.rate_hz < math.inf:
+            raise SignfaceError(f"rate_hz must be positive, not {self.rate_hz:g}", hint="give frames per second")
+        if self.start_s is not None and not math.isfinite(self.start_s):
+            raise SignfaceError(f"start_s is no number of seconds: {self.start_s}")
         begin, end = self.cut_s
         if not begin < end:
             raise SignfaceError(f"nothing lies from {self.cut_from} to {self.cut_to}", hint="--from is before --to")
@@ -166,7 +181,8 @@ class SolveSettings(Settings):
     @property
     def reading(self) -> dict[str, Any]:
         """How a recording is opened: keywords of `signface.open_recording`."""
-        return {name: getattr(self, name) for name in ("read_as", "subject", "film_timecode")}
+        named = {name: getattr(self, name) for name in ("unit", "read_as", "subject", "film_timecode")}
+        return {**named, "rate": self.rate_hz, "start": self.start_s}
 
     @property
     def cut_s(self) -> tuple[float, float]:
