@@ -3,7 +3,7 @@
 - `read_face`: finds out what a name or a path is, and brings it to millimetres.
 - `find_unit`: the unit of a mesh, from the size of a head.
 - `read_identities`: shapes of other heads on the default face.
-- `read_parts`: its eyes, teeth and mouth, for pictures.
+- `read_parts`, `read_hair`, `read_tint`: its eyes and mouth, brows and lashes, tint of skin, for pictures.
 """
 
 from __future__ import annotations
@@ -157,7 +157,39 @@ def read_parts() -> FaceModel:
     SignfaceError
         The file does not ship with this installation, or is damaged.
     """
-    file = models_folder() / "heads" / "parts.glb"
+    return _with_the_face("parts.glb")
+
+
+@lru_cache(maxsize=1)
+def read_hair() -> FaceModel:
+    """Brows and lashes of the default face, bound to its skin, with its 51 bases, for pictures only.
+
+    Raises
+    ------
+    SignfaceError
+        The file does not ship with this installation, or is damaged.
+    """
+    return _with_the_face("hair.glb")
+
+
+def _with_the_face(name: str) -> FaceModel:
+    file = models_folder() / "heads" / name
     if not file.is_file():
         raise SignfaceError("no such file", file=file, hint="install signface again")
     return face_in_millimetres(read_gltf(file), file)
+
+
+def read_tint() -> np.ndarray:
+    """(V, 3) factors on the colour of the default face's skin: lips, cheeks and lids are not like the rest.
+
+    Raises
+    ------
+    SignfaceError
+        The file does not ship with this installation, or is damaged.
+    """
+    file = models_folder() / "heads" / "tint.npz"
+    try:
+        with np.load(file, allow_pickle=False) as content:
+            return content["hundredths"].astype(np.float64) / 100.0
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise SignfaceError("the tint of the skin cannot be read", file=file, hint="install signface again") from error

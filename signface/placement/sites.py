@@ -269,7 +269,7 @@ def seen_skin(face: FaceModel) -> np.ndarray:
     What lies in the sockets, behind the lips or in the nostrils moves too, but carries no marker.
     """
     seen = np.zeros(len(face.mesh.vertices), dtype=bool)
-    mesh, _ = whole_mesh(face)
+    mesh, _ = whole_mesh(face, hair=False)  # a marker is glued on under hair as well
     for yaw, pitch in ((0.0, 0.0), (-60.0, 0.0), (60.0, 0.0), (0.0, -25.0)):
         camera = face_camera(face, yaw=yaw, pitch=pitch, size=_VIEW, margin=1.1)
         triangles = visible_triangles(mesh, camera)

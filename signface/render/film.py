@@ -27,11 +27,10 @@ from signface.extras import needed
 from signface.face.camera import Camera
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
-from signface.face.reading import read_parts
 from signface.files import whole_file
 from signface.render.head import Neck, moving_part, rotations_at
 from signface.render.raster import Scene, Style
-from signface.render.still import whole_mesh
+from signface.render.still import SKIN, whole_face
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
@@ -43,7 +42,7 @@ class Avatar:
     Parameters
     ----------
     face : FaceModel
-        With the default face, its eyes and mouth are drawn too.
+        With the default face, its eyes, mouth, brows and lashes are drawn too.
     size : (int, int)
         Width and height in pixels; even, as the films need.
     yaw, pitch : float
@@ -53,11 +52,13 @@ class Avatar:
         Its face markers are drawn as dots on the skin.
     colour : (float, float, float), optional
         One colour for the skin, 0 to 1.
+    skin : str
+        Tone of the default face's skin: fair, light, tan, brown, dark.
 
     Raises
     ------
     SignfaceError
-        The size is odd or out of range, or the extra `render` is not installed.
+        The size is odd or out of range, no tone of skin has this name, or the extra `render` is not installed.
 
     See Also
     --------
@@ -81,26 +82,24 @@ class Avatar:
         style: Style | None = None,
         layout: MarkerLayout | None = None,
         colour: tuple[float, float, float] | None = None,
+        skin: str = SKIN,
     ) -> None:
         check_size(size)
         self.face, self.size, self._layout = face, size, layout
-        mesh, colours = whole_mesh(face)
-        skin = len(face.mesh.vertices)
-        bases = face.bases
-        if len(mesh.vertices) > skin:  # eyes, teeth and mouth come with the default face
-            bases = np.concatenate([bases, read_parts().bases], axis=1)
+        whole = whole_face(face, skin=skin)
+        mesh, colours = whole.mesh, np.array(whole.colours)
+        self._skin = len(face.mesh.vertices)
         if colour is not None:
-            colours = colours.copy()
-            colours[:skin] = colour
+            colours[: self._skin] = colour
         self._neutral = mesh.vertices
-        self._bases = bases.reshape(face.n_bases, -1).astype(np.float32)  # for pictures, half the memory to go through
-        self._skin = skin
+        # For pictures, half the memory to go through.
+        self._bases = whole.bases.reshape(face.n_bases, -1).astype(np.float32)
         self._neck = Neck(face, mesh.vertices)
         camera = film_camera(face, size, yaw, pitch)
         # From front to back, so that what is hidden is seldom drawn first.
         depth = camera.project(mesh.vertices)[:, 2]
         order = np.argsort(-depth[mesh.triangles].max(axis=1), kind="stable")
-        self._scene = Scene(mesh.triangles[order], colours, camera, style)
+        self._scene = Scene(mesh.triangles[order], colours, camera, style, rest=mesh.vertices, skin=self._skin)
 
     def picture(self, weights: np.ndarray, head: np.ndarray | None = None) -> np.ndarray:
         """(height, width, 3) uint8: the face with (N,) weights; `head` as in `pose`."""

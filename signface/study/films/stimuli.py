@@ -24,6 +24,7 @@ from signface.errors import SignfaceError
 from signface.face.layout import MarkerLayout
 from signface.face.model import FaceModel
 from signface.files import whole_file
+from signface.render.still import SKIN, SKINS
 from signface.settings.solve import METHODS, SolveSettings
 from signface.signer import Signer
 from signface.study.design import Study
@@ -152,6 +153,7 @@ class StudyFilms:
     """Everything that `[render]` of a study says.
 
     `head`: whether it moves; stimuli of the thesis keep it still, so that only the face tells expressions apart.
+    `skin`: the tone of the avatar's skin; synthetic signers are not all alike.
     """
 
     plans: tuple[FilmPlan, ...]
@@ -160,6 +162,7 @@ class StudyFilms:
     face: str
     layout: str | None
     head: bool = False
+    skin: str = SKIN
 
 
 def plan_films(study: Study, *, takes_made: Callable[[Path, int], None] | None = None) -> StudyFilms:
@@ -192,6 +195,11 @@ def plan_films(study: Study, *, takes_made: Callable[[Path, int], None] | None =
         raise SignfaceError("render.head must be true or false", file=file)
     folder = study.folder / str(table.get("takes", "takes"))
     signer = table.get("synthetic_signer", -1)
+    skin = table.get(
+        "skin", list(SKINS)[(1 + signer) % len(SKINS)] if isinstance(signer, int) and signer >= 0 else SKIN
+    )
+    if skin not in SKINS:
+        raise SignfaceError(f"render.skin must be one of {', '.join(SKINS)}", file=file)
     if not folder.is_dir() and isinstance(signer, int) and signer >= 0 and takes_made is not None:
         takes_made(folder, signer)
     excerpts = read_excerpts(folder / "excerpts.csv")
@@ -216,6 +224,7 @@ def plan_films(study: Study, *, takes_made: Callable[[Path, int], None] | None =
         str(table.get("face", "default")),
         table.get("layout"),
         head,
+        skin,
     )
 
 
@@ -311,7 +320,7 @@ def render_study(
 
     @cache
     def avatar(colour: tuple[float, float, float] | None) -> Avatar:
-        return Avatar(face, size=films.size, colour=colour)
+        return Avatar(face, size=films.size, colour=colour, skin=films.skin)
 
     @cache
     def weights_file(folder: Path, excerpt: Excerpt) -> tuple[Descriptors, bool]:

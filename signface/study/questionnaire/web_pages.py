@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from signface.extras import needed
 from signface.study.design import Study
+from signface.study.questionnaire.length import with_counts
 from signface.study.questionnaire.questionnaire import Page, check_answer, pages_of
 from signface.study.questionnaire.security import FormKey, Refusal
 from signface.study.questionnaire.store import Participant, Refused, Store
@@ -56,7 +57,9 @@ class Questionnaire:
             lstrip_blocks=True,
             auto_reload=False,
         )
-        self._templates.filters["paragraphs"] = lambda text: [part for part in text.split("\n\n") if part.strip()]
+        self._templates.filters["paragraphs"] = lambda text: [
+            part for part in with_counts(text, study).split("\n\n") if part.strip()
+        ]
 
     # ---- what every request needs
 
