@@ -5,9 +5,13 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from signface.errors import SignfaceError
 from signface.files import whole_file
+
+if TYPE_CHECKING:
+    from signface.study.responses import Responses
 
 ANALYSE_EXAMPLE = "  signface study analyse responses.csv -o results --screenshots screenshots"
 SIMULATE_EXAMPLE = "  signface study simulate group-1 -o responses.csv --effect LSTS70:intensity=-0.3 --seed 1"
@@ -17,9 +21,9 @@ def add_analyse_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of `analyse`."""
     parser.add_argument(
         "responses",
-        metavar="RESPONSES.csv",
+        metavar="RESPONSES",
         nargs="+",
-        help="answers, one row per answer; several groups make one study",
+        help="a csv of answers, one row per answer, or a study's folder with answers.sqlite; several make one study",
     )
     parser.add_argument(
         "-o", "--output", metavar="FOLDER", help="where to write (default: RESPONSES-analysis beside it)"
@@ -34,7 +38,6 @@ def add_analyse_arguments(parser: argparse.ArgumentParser) -> None:
 def run_analyse(arguments: argparse.Namespace) -> int:
     """Print the tables; write the report and the tables as CSV and LaTeX."""
     from signface.report.study.report import write_report
-    from signface.study.reading import read_responses
     from signface.study.responses import combine
     from signface.study.statistics.analysis import analyse
     from signface.study.statistics.tables import as_text
@@ -44,8 +47,9 @@ def run_analyse(arguments: argparse.Namespace) -> int:
     if arguments.resamples < 100:
         raise SignfaceError(f"--resamples {arguments.resamples} is too few", hint="ask for at least 100")
     source = Path(arguments.responses[0])
+    source = source.resolve() if source.is_dir() else source  # "." has no name
     folder = Path(arguments.output) if arguments.output else source.with_name(f"{source.stem}-analysis")
-    responses = combine([read_responses(file) for file in arguments.responses])
+    responses = combine([_responses(file) for file in arguments.responses])
     for warning in responses.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     analysis = analyse(responses, alpha=arguments.alpha, resamples=arguments.resamples, seed=arguments.seed)
@@ -56,6 +60,30 @@ def run_analyse(arguments: argparse.Namespace) -> int:
         print(as_text(table), end="\n\n")
     print(f"{report}: report; tables as CSV and LaTeX beside it")
     return 0
+
+
+def _responses(source: str) -> Responses:
+    """The answers of a csv, or of a study's folder as `study export` would write them."""
+    from signface.study.reading import read_responses, validate
+
+    if not Path(source).is_dir():
+        return read_responses(source)
+    import pandas as pd
+
+    from signface.study.design import read_study
+    from signface.study.questionnaire.export import export_table
+    from signface.study.questionnaire.store import open_store
+
+    study = read_study(source, films=False)
+    file = study.folder / "answers.sqlite"
+    if not file.is_file():
+        raise SignfaceError("no answers yet", file=file, hint="signface study serve collects them")
+    store = open_store(file)
+    try:
+        columns, rows = export_table(study, store)
+    finally:
+        store.close()
+    return validate(pd.DataFrame(rows, columns=columns), name=source)
 
 
 def add_simulate_arguments(parser: argparse.ArgumentParser) -> None:

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from signface.cli.main import main
 from signface.errors import SignfaceError
 from signface.study.design import read_study
 from signface.study.questionnaire.export import COLUMNS, write_export
@@ -55,6 +56,19 @@ def test_a_questionnaire_of_the_thesis_goes_from_consent_to_an_export_that_analy
     responses = read_responses(tmp_path / "responses.csv")
     assert len(responses.table) == films
     site.store.close()
+    out = tmp_path / "results"
+    assert main(["study", "analyse", str(site.study.folder), "-o", str(out), "--resamples", "100"]) == 0
+    again = tmp_path / "again"
+    assert main(["study", "analyse", str(tmp_path / "responses.csv"), "-o", str(again), "--resamples", "100"]) == 0
+    means = "tables/means_by_method.csv"
+    assert (out / means).read_bytes() == (again / means).read_bytes()
+
+
+def test_a_study_nobody_has_answered_says_so(tmp_path, capsys):
+    study = shipped_study("group-1", tmp_path)
+    assert main(["study", "analyse", str(study.folder)]) == 2
+    assert "no answers yet" in capsys.readouterr().err
+    assert not (study.folder / "answers.sqlite").exists()
 
 
 def test_videos_come_after_animations(tmp_path):
