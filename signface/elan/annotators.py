@@ -15,8 +15,8 @@ import pandas as pd
 from lxml import etree
 
 from signface.elan.document import Row, tier_rows
+from signface.elan.links import film_origin, media_origins
 from signface.elan.reference import annotation_root, rows_table
-from signface.elan.times import film_origin, media_origins
 from signface.elan.translation import MappingOrFile, translated
 from signface.errors import SignfaceError, SignfaceWarning
 
@@ -29,7 +29,7 @@ def read_tiers(
 ) -> dict[str, pd.DataFrame]:
     """Every tier that hangs on no other, as a table `start_s, end_s, label`; annotations without a value left out.
 
-    Times are in the clock of the film (`signface.elan.times.film_origin`), labels without blanks at their ends. A tier
+    Times are in the clock of the film (`signface.elan.links.film_origin`), labels without blanks at their ends. A tier
     whose annotations overlap or have no time is left out with a `SignfaceWarning`, unless it is asked for.
 
     Parameters

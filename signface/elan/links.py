@@ -1,6 +1,7 @@
 """Links of an EAF to its film and its curves: each once, and found again where a file or a folder has moved.
 
 - `find_media`: which of the films of a document a file is; `places_of`: where a URL leads on this machine.
+- `film_origin`, `media_origins`: where the annotations' time 0 lies in a film (`TIME_ORIGIN`).
 - `link_media`: a film; `link_curves`: the curves and their description.
 - `curve_files`: which files the curves of an EAF go to; `warn_of_curves`: where ELAN will not show them.
 
@@ -17,14 +18,14 @@ import re
 import unicodedata
 import warnings
 from collections.abc import Sequence
-from os import PathLike
+from os import PathLike, fspath
 from pathlib import Path
 from urllib.parse import unquote
 
 from lxml import etree
 
 from signface.elan.document import link_urls
-from signface.errors import SignfaceWarning
+from signface.errors import SignfaceError, SignfaceWarning
 
 #: What ELAN knows a description of curves by, and what ours describes.
 TSCONF = "_tsconf.xml"
@@ -254,3 +255,73 @@ def _set(element: etree._Element, attributes: tuple[str, str], absolute: str, re
         element.set(attributes[1], relative)
     else:
         element.attrib.pop(attributes[1], None)
+
+
+def film_origin(root: etree._Element, file: Path, video: str | PathLike[str] | None = None) -> int:
+    """Milliseconds of the film at the annotations' time 0: film time = annotation time + origin, as ELAN plays it.
+
+    Parameters
+    ----------
+    root : element
+    file : Path
+        Named in errors.
+    video : path, optional
+        The film whose clock counts, known as `find_media` knows it, or by its name. One that the document does not
+        link begins with the annotations.
+        Without it, all films have to have one origin; sound counts only where no film is linked.
+
+    Raises
+    ------
+    SignfaceError
+        Several films have different origins, or one has an origin that is no number.
+    """
+    everything = media_origins(root, file, sound=True)
+    linked = None if video is None else find_media(root.find("HEADER"), video, file)
+    if linked is not None:
+        return int((linked.get("TIME_ORIGIN") or "0").strip())
+    if video is not None and _media_name(fspath(video)) in everything:
+        return everything[_media_name(fspath(video))]
+    origins = media_origins(root, file)
+    if video is not None:
+        if any(origins.values()):
+            said = ", ".join(f"{name} {origin} ms" for name, origin in origins.items())
+            warnings.warn(
+                f"{file}: {Path(video).name} is not linked in it and is taken to begin with its annotations; "
+                f"the films linked do not (TIME_ORIGIN: {said})",
+                SignfaceWarning,
+                stacklevel=3,
+            )
+        return 0
+    if len(set(origins.values())) > 1:
+        said = ", ".join(f"{name} {origin} ms" for name, origin in origins.items())
+        raise SignfaceError(
+            f"its films begin at different times (TIME_ORIGIN: {said})",
+            file=file,
+            hint="say by which film the take's times are: --video FILE, or the column video in takes.csv",
+        )
+    return next(iter(origins.values()), 0)
+
+
+def media_origins(root: etree._Element, file: Path, *, sound: bool = False) -> dict[str, int]:
+    """Name of each film that a document links, and its `TIME_ORIGIN` in milliseconds; of sound too, or without films.
+
+    Raises
+    ------
+    SignfaceError
+        One has an origin that is no number.
+    """
+    origins: dict[str, int] = {}
+    sounds: dict[str, int] = {}
+    for media in root.iterfind("HEADER/MEDIA_DESCRIPTOR"):
+        name = _media_name(media.get("MEDIA_URL") or media.get("RELATIVE_MEDIA_URL") or "")
+        text = (media.get("TIME_ORIGIN") or "0").strip()
+        if not text.lstrip("+-").isdecimal():
+            raise SignfaceError(f"TIME_ORIGIN of {name} is {text!r}, which is no count of milliseconds", file=file)
+        of_sound = (media.get("MIME_TYPE") or "").startswith("audio/") or media.get("EXTRACTED_FROM") is not None
+        (sounds if of_sound else origins)[name] = int(text)
+    return sounds | origins if sound or not origins else origins
+
+
+def _media_name(url: str) -> str:
+    """File name of a link or a path, as far as its folder may have moved."""
+    return unquote(url).replace("\\", "/").rpartition("/")[2].casefold()

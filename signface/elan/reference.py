@@ -20,8 +20,8 @@ from lxml import etree
 
 from signface.elan.document import CHANNEL_PREFIX, Row, read_document, recorded, tier_rows
 from signface.elan.frame_labels import frame_label_document, is_frame_labels
+from signface.elan.links import film_origin
 from signface.elan.tiers import clean_name, tier_name
-from signface.elan.times import film_origin
 from signface.elan.translation import MappingOrFile, as_mapping, tier_meanings
 from signface.elan.vocabularies import vocabulary_of_tier
 from signface.errors import SignfaceError, SignfaceWarning
@@ -57,7 +57,7 @@ def read_reference(
         and so are the labels returned.
     video : path, optional
         The film whose clock the times are of, where the file links several that begin at different times
-        (`signface.elan.times.film_origin`).
+        (`signface.elan.links.film_origin`).
 
     Returns
     -------

@@ -2,7 +2,6 @@
 
 - `annotation_spans`: start and end of every annotation, those without times of their own as ELAN draws them.
 - `parent_annotations`: which annotation each dependent one hangs on.
-- `film_origin`, `media_origins`: where the annotations' time 0 lies in the film (`TIME_ORIGIN`).
 
 ELAN spreads the time slots that have no time over the chain of one tier, between the ends of the chain that have one
 (`TimeOrderImpl.proposeTimeFor` in its sources), whatever slots of other tiers stand between them in TIME_ORDER; and
@@ -11,17 +10,11 @@ annotations of a symbolic subdivision over their parent's time (`RefAnnotation.g
 
 from __future__ import annotations
 
-import warnings
 from collections import defaultdict
 from collections.abc import Iterator
 from itertools import pairwise
-from os import PathLike, fspath
-from pathlib import Path
-from urllib.parse import unquote
 
 from lxml import etree
-
-from signface.errors import SignfaceError, SignfaceWarning
 
 #: Start and end of an annotation in milliseconds; None where nothing says when it is.
 Span = tuple[int | None, int | None]
@@ -183,69 +176,3 @@ def _in_order(siblings: list[etree._Element]) -> list[str | None]:
             ordered.append(current)
             current = following.get(current)
     return ordered + [one for one in there if one not in ordered]
-
-
-def film_origin(root: etree._Element, file: Path, video: str | PathLike[str] | None = None) -> int:
-    """Milliseconds of the film at the annotations' time 0: film time = annotation time + origin, as ELAN plays it.
-
-    Parameters
-    ----------
-    root : element
-    file : Path
-        Named in errors.
-    video : path, optional
-        The film whose clock counts, told by its name. One that the document does not link begins with the annotations.
-        Without it, all films have to have one origin; sound counts only where no film is linked.
-
-    Raises
-    ------
-    SignfaceError
-        Several films have different origins, or one has an origin that is no number.
-    """
-    everything = media_origins(root, file, sound=True)
-    if video is not None and _media_name(fspath(video)) in everything:
-        return everything[_media_name(fspath(video))]
-    origins = media_origins(root, file)
-    if video is not None:
-        if any(origins.values()):
-            said = ", ".join(f"{name} {origin} ms" for name, origin in origins.items())
-            warnings.warn(
-                f"{file}: {Path(video).name} is not linked in it and is taken to begin with its annotations; "
-                f"the films linked do not (TIME_ORIGIN: {said})",
-                SignfaceWarning,
-                stacklevel=3,
-            )
-        return 0
-    if len(set(origins.values())) > 1:
-        said = ", ".join(f"{name} {origin} ms" for name, origin in origins.items())
-        raise SignfaceError(
-            f"its films begin at different times (TIME_ORIGIN: {said})",
-            file=file,
-            hint="say by which film the take's times are: --video FILE, or the column video in takes.csv",
-        )
-    return next(iter(origins.values()), 0)
-
-
-def media_origins(root: etree._Element, file: Path, *, sound: bool = False) -> dict[str, int]:
-    """Name of each film that a document links, and its `TIME_ORIGIN` in milliseconds; of sound too, or without films.
-
-    Raises
-    ------
-    SignfaceError
-        One has an origin that is no number.
-    """
-    origins: dict[str, int] = {}
-    sounds: dict[str, int] = {}
-    for media in root.iterfind("HEADER/MEDIA_DESCRIPTOR"):
-        name = _media_name(media.get("MEDIA_URL") or media.get("RELATIVE_MEDIA_URL") or "")
-        text = (media.get("TIME_ORIGIN") or "0").strip()
-        if not text.lstrip("+-").isdecimal():
-            raise SignfaceError(f"TIME_ORIGIN of {name} is {text!r}, which is no count of milliseconds", file=file)
-        of_sound = (media.get("MIME_TYPE") or "").startswith("audio/") or media.get("EXTRACTED_FROM") is not None
-        (sounds if of_sound else origins)[name] = int(text)
-    return sounds | origins if sound or not origins else origins
-
-
-def _media_name(url: str) -> str:
-    """File name of a link or a path, as far as its folder may have moved."""
-    return unquote(url).replace("\\", "/").rpartition("/")[2].casefold()

@@ -41,12 +41,11 @@ from signface.elan.document import (
     write_document,
 )
 from signface.elan.elements import CONSTRAINTS
-from signface.elan.links import curve_files, link_curves, link_media, warn_of_curves
+from signface.elan.links import curve_files, film_origin, link_curves, link_media, warn_of_curves
 from signface.elan.mapping import read_mapping
 from signface.elan.merging import put_tiers
 from signface.elan.preferences import write_preferences
 from signface.elan.tiers import Tier, in_annotation_time, xml_text
-from signface.elan.times import film_origin
 from signface.elan.upgrade import is_before_28, upgrade
 from signface.errors import SignfaceError
 from signface.label.vocabulary import Vocabulary

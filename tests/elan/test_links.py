@@ -9,6 +9,8 @@ import pytest
 from lxml import etree
 
 from signface.annotation import Annotation
+from signface.elan.document import read_document
+from signface.elan.links import film_origin
 from signface.elan.writing import write_eaf
 from signface.errors import SignfaceWarning
 from tests.elan.test_curves import descriptors
@@ -54,6 +56,19 @@ def test_a_film_that_the_file_links_is_not_linked_again(tmp_path, urls):
     assert len(media(file)) == 1
     assert media(file)[0]["TIME_ORIGIN"] == "40"
     assert_valid(file)
+
+
+def test_of_two_films_of_one_name_the_one_that_is_meant_has_the_clock(tmp_path):
+    films = ""
+    for name, origin in (("cam1", 0), ("cam2", 500)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "film.mp4").write_bytes(name.encode())
+        urls = f'MEDIA_URL="file:///x/{name}/film.mp4" RELATIVE_MEDIA_URL="./{name}/film.mp4"'
+        films += f'<MEDIA_DESCRIPTOR {urls} MIME_TYPE="video/mp4" TIME_ORIGIN="{origin}"/>'
+    file = tmp_path / "lab.eaf"
+    file.write_text(LAB.replace(OF_THE_LAB, films), "utf-8")
+    root = read_document(file).getroot()
+    assert [film_origin(root, file, tmp_path / name / "film.mp4") for name in ("cam1", "cam2")] == [0, 500]
 
 
 def test_what_was_taken_from_a_film_follows_it(tmp_path):
