@@ -1,12 +1,15 @@
 """Times that a file states: their unit, their beginning, how evenly they rise, and what it declares besides."""
 
+import struct
+
 import numpy as np
 import pytest
 
 from signface.errors import SignfaceError, SignfaceWarning
+from signface.takes.formats.c3d import write_c3d
 from signface.takes.formats.table import write_table
 from signface.takes.reading import read_take
-from tests.fixtures.takes_files import moving_face, write_qtm, write_trc
+from tests.fixtures.takes_files import moving_face, write_pose, write_qtm, write_trc
 
 TAKE, _ = moving_face(0.5, 100.0, face_markers=4, seed=5)
 
@@ -104,3 +107,26 @@ def test_more_names_than_a_trc_declares_are_read_with_a_word(tmp_path):
     file.write_text("\n".join(lines) + "\n")
     with pytest.warns(SignfaceWarning, match="NumMarkers says 5"):
         assert read_take(file).labels == TAKE.labels
+
+
+@pytest.mark.parametrize("stale", [3, 3000])
+def test_the_frames_of_a_c3d_are_those_that_its_size_bears_out(stale, tmp_path):
+    file = tmp_path / "take.c3d"
+    write_c3d(TAKE, file)
+    content = bytearray(file.read_bytes())
+    at = content.index(b"FRAMES") + len(b"FRAMES") + 2
+    kind, dimensions = struct.unpack_from("<bB", content, at)
+    struct.pack_into("<f" if kind == 4 else "<H", content, at + 2 + dimensions, stale)
+    file.write_bytes(content)
+    with pytest.warns(SignfaceWarning, match=f"{stale} frames; by its size there are {TAKE.n_frames}"):
+        take = read_take(file)
+    np.testing.assert_allclose(take.positions, TAKE.positions, atol=1e-3)
+
+
+def test_a_film_of_a_thousand_frames_a_second_is_doubted_in_the_history(tmp_path):
+    names = ["33", "263", "133", "362", "1"]
+    rest = np.array([[250.0, 200, 0], [390, 200, 0], [290, 200, -0.01], [350, 200, -0.01], [320, 250, -0.1]])
+    file = write_pose(tmp_path / "take.pose", np.tile(rest, (12, 1, 1)), names, rate=1000.0)
+    with pytest.warns(SignfaceWarning, match="1000 frames a second"):
+        assert any("--rate" in entry for entry in read_take(file).history)
+    assert read_take(file, rate=30).rate == 30

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from signface.errors import SignfaceError
 from signface.files import reading
+from signface.takes.formats.doubts import doubt
 
 BLOCK = 512
 MAGIC = 0x50
@@ -267,8 +268,11 @@ def _checked(
     if frames < 1:
         raise SignfaceError("the C3D file has no frames", file=file, hint="export the trajectories with it")
     word = 4 if scale < 0 else 2
-    words = points * 4 + (round(channels * ratio) if "USED" in analog else analog_in_header)
     offset = (data_block - 1) * BLOCK
+    words = points * 4 + (round(channels) * round(ratio) if "USED" in analog else analog_in_header)
+    from_header = points * 4 + analog_in_header, last - first + 1 if first else last
+    if words != from_header[0] or frames != from_header[1]:
+        words, frames = _by_size(file, size - offset, word, (words, frames), from_header)
     if size - offset < frames * words * word:
         raise _damaged(file, f"it ends after {max(0, (size - offset) // (words * word))} of {frames} frames")
     _check_rotations(file, size, groups.get("ROTATION", {}), numbers, frames)
@@ -286,6 +290,21 @@ def _checked(
         order=numbers.order,
         dec=numbers.dec,
     )
+
+
+def _by_size(file: Path, size: int, word: int, parameters: tuple[int, int], header: tuple[int, int]) -> tuple[int, int]:
+    """Numbers a frame and frames, where parameters and header disagree: those that the size of the data bears out.
+
+    Data are filled up to a whole block, so that what is right leaves less than one.
+    """
+    for words, frames in dict.fromkeys([parameters, (header[0], parameters[1]), (parameters[0], header[1]), header]):
+        if frames >= 1 and 0 <= size - frames * words * word < BLOCK:
+            if words != parameters[0]:
+                doubt(file, f"its parameters say {parameters[0]} numbers a frame; by its size there are {words}")
+            if frames != parameters[1]:
+                doubt(file, f"POINT:FRAMES or TRIAL says {parameters[1]} frames; by its size there are {frames}")
+            return words, frames
+    return parameters
 
 
 def _check_rotations(file: Path, size: int, group: dict[str, _Parameter], numbers: _Numbers, frames: int) -> None:

@@ -18,10 +18,15 @@ import numpy as np
 from signface.errors import SignfaceError
 from signface.files import reading
 from signface.marker_names import SeveralSigners
+from signface.takes.formats.doubts import doubt
 from signface.takes.formats.missing import mark_missing
 from signface.takes.formats.people import RIVAL, followed
 from signface.takes.formats.registry import FileHead, register_format
+from signface.takes.formats.timing import SLOWEST
 from signface.takes.take import Take
+
+#: No film of a signer has more frames a second (Hz).
+FASTEST_FILM = 480.0
 
 FACE = "FACE_LANDMARKS"
 
@@ -154,6 +159,8 @@ def read_pose(path: str | PathLike[str], *, unit: str | None = None, subject: st
     if not (np.isfinite(rate) and rate > 0):
         raise SignfaceError("the .pose file has the rate 0", file=file, hint="extract it again from the video")
     landmarks, confidence, names, notes, deep = _landmarks(pose, file, subject)
+    if not SLOWEST <= rate <= FASTEST_FILM:
+        notes.append(doubt(file, f"{rate:g} frames a second are no film's: give its own with --rate"))
     landmarks[~(confidence > 0) | (np.abs(landmarks) > 1e6).any(axis=2)] = np.nan
     missing = np.isnan(mark_missing(landmarks)[..., 0])
     if missing.all():
