@@ -237,7 +237,7 @@ def learn_corrections(arguments: argparse.Namespace) -> None:
 def compare_annotators(arguments: argparse.Namespace) -> None:
     """Print the agreement on every tier; write tables and pictures when asked."""
     from signface.elan.annotators import read_annotators
-    from signface.metrics.tiers import compare_tiers, renamed
+    from signface.metrics.tiers import compare_tiers, explained, renamed
 
     same = {old: str(new) for pairs in arguments.same for old, new in pairs.items()}
     asked = [*arguments.tier, *(old for old, new in same.items() if new in arguments.tier)]
@@ -257,9 +257,15 @@ def compare_annotators(arguments: argparse.Namespace) -> None:
     )
     first, second = list(annotators)[:2]
     for agreement in agreements:
-        columns = agreement.table.drop(columns="tier").dropna(axis=1, how="all")
+        columns = agreement.table.drop(columns="tier")
+        if not arguments.gamma:
+            columns = columns.drop(columns=["gamma", "gamma_low", "gamma_high"])
+        numbers = columns.select_dtypes("float").columns
+        columns[numbers] = columns[numbers].round(4) + 0.0  # no -0.00
         print(agreement.tier)
-        print(columns.to_string(index=False, float_format=lambda number: f"{number:.2f}", na_rep=""))
+        print(columns.to_string(index=False, float_format=lambda number: f"{number:.2f}", na_rep="undefined"))
+        for line in explained(agreement):
+            print(line)
         print(f"seconds, {first} down, {second} across:")
         print(agreement.seconds.to_string(float_format=lambda number: f"{number:.1f}" if number else "."))
         print()

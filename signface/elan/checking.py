@@ -10,6 +10,7 @@ saying in plain words.
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,9 +20,10 @@ from pathlib import Path
 
 from lxml import etree
 
+from signface.elan.constraints import broken_constraints
 from signface.elan.document import NAMES, read_document
 from signface.elan.times import parent_annotations
-from signface.errors import SignfaceError
+from signface.errors import SignfaceError, SignfaceWarning
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,8 @@ def check_file(path: str | PathLike[str], *, media_s: float | None = None) -> Fi
     ()
     """
     root = read_document(path).getroot()
-    problems = tuple(find_problems(root, media_ms=None if media_s is None else 1000 * media_s))
+    found = find_problems(root, media_ms=None if media_s is None else 1000 * media_s)
+    problems = (*found, *broken_constraints(root))
     tiers, annotations = root.findall("TIER"), root.findall("TIER/ANNOTATION")
     return FileCheck(Path(path), root.get("VERSION") or "", len(tiers), len(annotations), problems)
 
@@ -86,7 +89,11 @@ def check_document(root: etree._Element, file: Path) -> None:
     SignfaceError
         The first problem and the number of others, in one line.
     """
-    problems = list(find_problems(root))
+    problems = list(find_problems(root, of_times=False))
+    harmless = [problem for problem in find_problems(root) if problem not in problems]
+    if harmless and not problems:  # ELAN opens such a file, and nothing of it is touched
+        more = f" (and {len(harmless) - 1} more)" if len(harmless) > 1 else ""
+        warnings.warn(f"{file}: {harmless[0]}{more}; it stays as it is", SignfaceWarning, stacklevel=3)
     if problems:
         more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
         raise SignfaceError(
@@ -94,7 +101,7 @@ def check_document(root: etree._Element, file: Path) -> None:
         )
 
 
-def find_problems(root: etree._Element, *, media_ms: float | None = None) -> Iterator[str]:
+def find_problems(root: etree._Element, *, media_ms: float | None = None, of_times: bool = True) -> Iterator[str]:
     """Problems of a document, each as a short clause.
 
     Duplicate identifiers, dangling references, rings of dependent annotations, annotations that do not end after
@@ -106,10 +113,12 @@ def find_problems(root: etree._Element, *, media_ms: float | None = None) -> Ite
         What `document.read_document` returns.
     media_ms : float, optional
         Length of the media in milliseconds; annotations that end after it are named.
+    of_times : bool
+        Name annotations that overlap or do not end after they start.
     """
     yield from _duplicates(root)
     yield from _dangling_names(root)
-    yield from _annotations(root, media_ms)
+    yield from _annotations(root, media_ms, of_times)
 
 
 def _duplicates(root: etree._Element) -> Iterator[str]:
@@ -155,7 +164,7 @@ def _dangling_names(root: etree._Element) -> Iterator[str]:
             yield f"the vocabulary value {value.text} is in the language {value.get('LANG_REF')}, which is not there"
 
 
-def _annotations(root: etree._Element, media_ms: float | None) -> Iterator[str]:
+def _annotations(root: etree._Element, media_ms: float | None, of_times: bool) -> Iterator[str]:
     slots = {slot.get("TIME_SLOT_ID"): slot.get("TIME_VALUE") for slot in root.iterfind("TIME_ORDER/TIME_SLOT")}
     parents = parent_annotations(root)
     known = {annotation.get("ANNOTATION_ID") for annotation in root.iterfind("TIER/ANNOTATION/*")}
@@ -180,7 +189,7 @@ def _annotations(root: etree._Element, media_ms: float | None) -> Iterator[str]:
                 yield f"the annotation {identifier} refers to the time slot {missing[0]}, which is not there"
                 continue
             start, end = (slots[slot] for slot in ends)
-            if start is None or end is None:
+            if start is None or end is None or not of_times:
                 continue
             if int(start) >= int(end):
                 yield f"the annotation {identifier} on tier {name} does not end after it starts ({start} ms)"

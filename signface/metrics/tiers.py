@@ -1,6 +1,6 @@
 """Agreement of annotators on all their tiers.
 
-- `compare_tiers`: a `TierAgreement` for each tier.
+- `compare_tiers`: a `TierAgreement` for each tier; `explained`: what its values do not say by themselves.
 """
 
 from __future__ import annotations
@@ -90,6 +90,26 @@ def compare_tiers(
     return [
         _compare(tier, {name: theirs[tier] for name, theirs in annotators.items()}, overlap, gamma) for tier in wanted
     ]
+
+
+def explained(agreement: TierAgreement) -> list[str]:
+    """Why measures of the first two annotators are undefined or low although they agree on much of the time."""
+    row, lines = agreement.table.iloc[0], []
+    (name, first), (other, second) = list(agreement.annotators.items())[:2]
+    labels = {who: set(table["label"]) for who, table in ((name, first), (other, second))}
+    if pd.isna(row["cohen_kappa"]) or pd.isna(row["modified_kappa"]):
+        lines.append(
+            "undefined: nothing is annotated"
+            if not len(first) or not len(second)
+            else "undefined: with one label only and nothing unmatched, chance could not disagree (0/0)"
+        )
+    if row["matched"] == 0 and len(first) and len(second):
+        lines.append("no annotation is matched: none shares enough of the longer one (--overlap)")
+    if row["agreement"] >= 0.5 and row["cohen_kappa"] < 0.2:
+        same = next((who for who, held in labels.items() if len(held) == 1), None)
+        reason = f"{same} never changes the label" if same else "one label covers nearly all of the time"
+        lines.append(f"kappa is low at {row['agreement']:.0%} agreement: {reason}, so that chance agrees as often")
+    return lines
 
 
 def renamed(

@@ -7,8 +7,9 @@ import pytest
 import signface as sf
 from signface.cli.main import main
 from signface.elan.annotators import read_annotators
+from signface.elan.checking import check_file
 from signface.errors import SignfaceError, SignfaceWarning
-from tests.elan.test_times import aligned, hanging, tier, write
+from tests.elan.test_times import aligned, hanging, labelled, rows, tier, write
 
 SLOTS = "t1=0 t2=1000 t3=1200 t4=3000"
 
@@ -80,3 +81,56 @@ def test_a_reference_that_dangles_is_said_and_not_dropped(tmp_path):
     file = write(tmp_path / "a.eaf", SLOTS, two("affect", "t2"), notes)
     with pytest.raises(SignfaceError, match="'x' has no time on the tier notes"):
         sf.read_tiers(file, tiers=["notes"])
+
+
+def test_what_is_undefined_is_said_and_why_kappa_is_low(tmp_path, capsys):
+    for name in ("eva", "tom"):
+        write(tmp_path / f"{name}.eaf", SLOTS, two("affect", "t2", "x", "x"))
+    assert main(["elan", "agree", str(tmp_path / "eva.eaf"), str(tmp_path / "tom.eaf")]) == 0
+    said = capsys.readouterr().out
+    assert "modified_kappa" in said
+    assert "undefined: with one label only" in said
+    write(tmp_path / "long.eaf", SLOTS, tier("affect", "top", aligned("a", "t1", "t4", "x")))
+    write(tmp_path / "many.eaf", SLOTS, two("affect", "t3", "y", "x"))
+    assert main(["elan", "agree", str(tmp_path / "long.eaf"), str(tmp_path / "many.eaf"), "--overlap", "0.9"]) == 0
+    said = capsys.readouterr().out
+    assert "-0.00" not in said
+    assert "no annotation is matched" in said
+    assert "long never changes the label" in said
+
+
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        (tier("Tr", "one", aligned("b", "t1", "t2", "x"), parent="Utt"), "has times and no parent"),
+        (tier("W", "time", aligned("b", "t3", "t4", "x"), parent="Utt"), "lies in none of Utt"),
+        (tier("Tr", "one", hanging("b", "a", "x")), "has no parent, its type wants one"),
+        (tier("Tr", "top", hanging("b", "a", "x")), "has no times of its own"),
+        (tier("O", "top", aligned("c", "t3", "t4", "o")) + tier("Tr", "one", hanging("b", "c", "x"), parent="Utt"),
+         "hangs on O, not Utt"),
+    ],
+)  # fmt: skip
+def test_check_names_what_breaks_the_hierarchy(tmp_path, made, said):
+    file = write(tmp_path / "a.eaf", SLOTS, tier("Utt", "top", aligned("a", "t1", "t2", "u")), made)
+    assert any(said in problem for problem in check_file(file).problems)
+
+
+def test_check_names_references_that_lead_nowhere_the_unit_and_the_order(tmp_path):
+    file = write(tmp_path / "a.eaf", SLOTS, tier("Utt", "top", aligned("a", "t1", "t2", "u")))
+    text = file.read_text("utf-8").replace('ANNOTATION_ID="a"', 'ANNOTATION_ID="a" CVE_REF="c7" EXT_REF="er9"')
+    text = text.replace('"milliseconds"', '"NTSC-frames"').replace(
+        "</ANNOTATION_DOCUMENT>", '<TIER TIER_ID="late" LINGUISTIC_TYPE_REF="top"/></ANNOTATION_DOCUMENT>'
+    )
+    file.write_text(text, "utf-8")
+    problems = " ".join(check_file(file).problems)
+    for said in ("entry c7", "reference er9", "TIME_UNITS is NTSC-frames", "a TIER stands behind"):
+        assert said in problems
+
+
+def test_overlaps_on_a_labs_tier_do_not_keep_ours_out(tmp_path):
+    context = tier("context", "top", aligned("c1", "t1", "t3", "x"), aligned("c2", "t2", "t4", "y"))
+    file = write(tmp_path / "a.eaf", SLOTS, context)
+    with pytest.warns(SignfaceWarning, match="overlap at 1000 ms"):
+        sf.write_eaf(labelled([(0.1, 0.9, "N")]), into=file, signer="S1")
+    assert rows(file, "context") == [(0, 1200, "x"), (1000, 3000, "y")]
+    assert rows(file, "affect@S1") == [(100, 900, "N")]
