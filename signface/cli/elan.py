@@ -261,7 +261,7 @@ def compare_annotators(arguments: argparse.Namespace) -> None:
         if not arguments.gamma:
             columns = columns.drop(columns=["gamma", "gamma_low", "gamma_high"])
         numbers = columns.select_dtypes("float").columns
-        columns[numbers] = columns[numbers].round(4) + 0.0  # no -0.00
+        columns[numbers] = columns[numbers].round(2) + 0.0  # no -0.00
         print(agreement.tier)
         print(columns.to_string(index=False, float_format=lambda number: f"{number:.2f}", na_rep="undefined"))
         for line in explained(agreement):
