@@ -130,3 +130,10 @@ def test_a_film_of_a_thousand_frames_a_second_is_doubted_in_the_history(tmp_path
     with pytest.warns(SignfaceWarning, match="1000 frames a second"):
         assert any("--rate" in entry for entry in read_take(file).history)
     assert read_take(file, rate=30).rate == 30
+
+
+def test_a_face_of_a_third_of_a_millimetre_is_doubted(tmp_path):
+    file = write_trc(TAKE, tmp_path / "take.trc", scale=0.001)
+    with pytest.warns(SignfaceWarning, match="too small for a face"):
+        read_take(file)
+    np.testing.assert_allclose(read_take(file, unit="m").positions, TAKE.positions, atol=0.01)

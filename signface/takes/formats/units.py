@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -14,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from signface.errors import SignfaceError
+from signface.takes.formats.doubts import doubt
 from signface.takes.formats.missing import mark_missing
 
 #: Millimetres in one of each unit, by the spellings that motion-capture software writes.
@@ -29,6 +31,9 @@ MILLIMETRES = {
 
 #: A cloud of markers (on a face, a head or a whole body) is narrower than this in metres, then in centimetres.
 WIDEST_IN_METRES, WIDEST_IN_CENTIMETRES = 4.0, 45.0
+
+#: A face, or a cloud that has one, is neither narrower nor wider (mm).
+NARROWEST, WIDEST = 10.0, 20000.0
 
 #: Some so many frames, evenly taken, tell the width of the cloud.
 SAMPLE = 300
@@ -147,4 +152,10 @@ def in_millimetres(
         factor, note = unit_factor(in_file, given, markers=markers, sample=lambda: seen(0, frames, step))
     except SignfaceError as error:
         raise error.at(file) from error
+    width = extent(seen(0, frames, step) * factor) if given is None and markers > 2 else math.nan
+    if 0 < width < NARROWEST or width > WIDEST:
+        size = "small" if width < NARROWEST else "large"
+        note += "; " + doubt(
+            file, f"its markers are {width:.3g} mm wide, too {size} for a face: give the unit with --unit"
+        )
     return lambda begin, end, step: seen(begin, end, step) * factor, note
