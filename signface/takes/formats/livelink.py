@@ -22,11 +22,24 @@ ROTATIONS = ("HeadYaw", "HeadPitch", "HeadRoll")
 #: Rates at which phones record; a timecode cannot tell 29.97 from 30.
 USUAL_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 120.0)
 USUAL_RATE = 60.0
+#: A count that ends this near a usual rate (part of it) has lost its last frames.
+NEAR = 0.9
+DAY_S = 86400.0
 
 
 def base_name(column: str) -> str:
     """The ARKit name of a column: `EyeBlinkLeft` is `eyeBlinkLeft`."""
     return column[:1].lower() + column[1:]
+
+
+def _turns(seconds: np.ndarray, frames: np.ndarray) -> float | None:
+    """The rate that most seconds end at, where frames are counted one by one; None where they do not agree."""
+    ends = np.flatnonzero(np.diff(seconds) == 1)
+    within = np.diff(frames)[np.diff(seconds) == 0]
+    if len(ends) == 0 or len(within) == 0 or (within == 1).mean() < 0.9:
+        return None
+    values, counts = np.unique(frames[ends] + 1, return_counts=True)
+    return float(values[counts.argmax()]) if counts.max() > len(ends) / 2 else None
 
 
 def _frames(cells: list[str], file: Path) -> tuple[np.ndarray, float]:
@@ -39,10 +52,14 @@ def _frames(cells: list[str], file: Path) -> tuple[np.ndarray, float]:
     if len(fields) < 2:
         raise SignfaceError("has one frame, and a rate needs two", file=file, hint="export more of the recording")
     seconds = fields[:, :3] @ (3600.0, 60.0, 1.0)
+    seconds += DAY_S * np.cumsum(np.diff(seconds, prepend=seconds[0]) < -DAY_S / 2)  # past midnight
     # Within a second the frame numbers rise to the rate less one. A take within one second does not show it.
     highest = fields[:, 3].max() + 1
     least = highest if (np.diff(seconds) > 0).any() else max(highest, USUAL_RATE)
     counted = min((rate for rate in USUAL_RATES if rate >= least), default=highest)
+    turning = _turns(seconds, fields[:, 3])
+    if turning is not None and turning < NEAR * counted:
+        counted = turning  # slower than any usual rate, and counted to its end in most seconds: no frames are lost
     whole = seconds * counted + fields[:, 3]
     if (np.diff(whole) > 0).mean() > 0.9:
         frames, rate = whole, counted  # the parts of frames only say how far the camera runs beside the clock

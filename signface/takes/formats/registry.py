@@ -26,6 +26,7 @@ from typing import Literal, TypeVar
 
 from signface.descriptors import Descriptors
 from signface.errors import SignfaceError, SignfaceWarning
+from signface.takes.formats.foreign import what_to_export
 from signface.takes.formats.text import header_cells
 from signface.takes.recording import TakeFile
 from signface.takes.take import Take
@@ -33,7 +34,19 @@ from signface.takes.take import Take
 #: The modules of this folder that declare a format, in the order in which formats are listed.
 SHIPPED = tuple(
     f"signface.takes.formats.{name}"
-    for name in ["c3d", "trc", "qtm", "table", "pose", "livelink", "openface", "openface_units", "kinect", "weights"]
+    for name in [
+        "c3d",
+        "trc",
+        "qtm",
+        "table",
+        "capture_csv",
+        "pose",
+        "livelink",
+        "openface",
+        "openface_units",
+        "kinect",
+        "weights",
+    ]
 )
 
 #: The group of entry points by which installed packages bring formats.
@@ -261,6 +274,8 @@ def format_of(path: str | PathLike[str], read_as: str | None = None) -> Format:
     certainty, _, surest = max(certainties, key=lambda entry: entry[:2])
     if certainty > 0:
         return surest
+    if foreign := what_to_export(head.path.suffix):
+        raise SignfaceError(foreign[0], file=head.path, hint=foreign[1])
     promised = [format.title for format in formats if head.path.suffix.lower() in format.endings]
     hint = f"signface reads {', '.join(format.title for format in formats)}"
     if promised:

@@ -1,4 +1,4 @@
-"""CSV with one row a frame: `time_s`, then `LABEL_x, LABEL_y, LABEL_z` for each marker.
+"""CSV with one row a frame: `time_s` (a column `frame` may stand before it), then `LABEL_x, LABEL_y, LABEL_z` for each marker.
 
 - `open_table`, `write_table`.
 """
@@ -26,13 +26,21 @@ AXES = ("x", "y", "z")
 TIME = re.compile(
     r"^(time|timestamp|time ?code|t)([ _]*[\[(]?(s|sec|seconds?|ms|msec|us|µs|ns|min|unix|utc)?[\])]?)$", re.I
 )
+#: A column of frames' numbers, which may stand before it.
+FRAME = re.compile(r"^(frame|frame ?(number|no|nr|id|#)|#)\.?$", re.I)
 
 
-def _markers(columns: list[str], file: Path) -> tuple[list[str], np.ndarray]:
-    """Labels in order, and the (M, 3) column numbers of their coordinates."""
+def _time_column(columns: list[str]) -> int:
+    """The number of the column of times: the first, or the second after one of frames' numbers; -1 where there is none."""
+    after_frames = len(columns) > 1 and FRAME.match(columns[0]) and TIME.match(columns[1])
+    return 1 if after_frames else 0 if columns and TIME.match(columns[0]) else -1
+
+
+def _markers(columns: list[str], first: int, file: Path) -> tuple[list[str], np.ndarray]:
+    """Labels in order, and the (M, 3) column numbers of their coordinates, which begin at `first`."""
     numbers_of: dict[str, list[int]] = {}
     order: list[tuple[str, list[int]]] = []
-    for number, column in enumerate(columns[1:], start=1):
+    for number, column in enumerate(columns[first:], start=first):
         label, _, axis = column.rpartition("_")
         if axis.lower() not in AXES or not label:
             raise SignfaceError(
@@ -54,7 +62,8 @@ def _markers(columns: list[str], file: Path) -> tuple[list[str], np.ndarray]:
 
 
 def _certainty(head: FileHead) -> float:
-    coordinates = [cell.lower().rpartition("_")[2] in AXES for cell in head.cells[1:4]]
+    begin = max(0, _time_column(head.cells)) + 1
+    coordinates = [cell.lower().rpartition("_")[2] in AXES for cell in head.cells[begin : begin + 3]]
     return 0.7 * (len(coordinates) == 3 and all(coordinates))
 
 
@@ -78,13 +87,14 @@ def open_table(path: str | PathLike[str], *, unit: str | None = None, rate: floa
     file = Path(path)
     text = TextFile(file)
     columns, separator = header_cells(text.lines(0, 1)[0][1])
-    if not columns or not TIME.match(columns[0]):
+    timed = _time_column(columns)
+    if timed < 0:
         raise SignfaceError("its first column is not time_s", file=file, hint="put the time in seconds there")
     while columns and not columns[-1]:
         columns.pop()
-    labels, coordinates = _markers(columns, file)
+    labels, coordinates = _markers(columns, timed + 1, file)
     rows = TextRows(text, 1, len(columns), separator)
-    clock = Clock(rate, 0.0) if rate else read_clock(rows.column(0), file, heading=columns[0])
+    clock = Clock(rate, 0.0) if rate else read_clock(rows.column(timed), file, heading=columns[timed])
     kept, names, notes = clean_labels(labels)
     if not kept:
         raise SignfaceError("none of the markers has a label", file=file, hint="label the markers")

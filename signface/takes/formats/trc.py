@@ -1,7 +1,8 @@
 """TRC, Motion Analysis' text format of trajectories, also written by OpenSim, Cortex and OptiTrack.
 
 Five lines of header: `PathFileType 4 (X/Y/Z) name`; the names of the fields (`DataRate`, `NumFrames`, `Units`, ...);
-their values; `Frame# Time` and the marker names, one for every three columns; `X1 Y1 Z1 ...`. Then a row a frame.
+their values; `Frame# Time` and the marker names, one for every three columns; `X1 Y1 Z1 ...`. Then a row a frame. Cells are
+separated by tabs; commas and blanks, which other programs put there, are read too.
 """
 
 from __future__ import annotations
@@ -27,6 +28,11 @@ def _float(word: str) -> float:
         return float(word.replace(",", "."))
     except ValueError:
         return math.nan
+
+
+def _separator(names: str) -> str | None:
+    """What separates the cells of the line of names: tabs, in files that people have edited commas, or blanks (None)."""
+    return next((sign for sign in ("\t", ",", ";") if sign in names), None)
 
 
 @register_format(
@@ -56,13 +62,16 @@ def open_trc(path: str | PathLike[str], *, unit: str | None = None, rate: float 
         raise SignfaceError("is no TRC file", file=file, hint="its first line begins with PathFileType")
     if 4 not in lines or text.line_numbers[-1] < 5:
         raise SignfaceError("the TRC file is cut short in its header", file=file, hint="export it again")
-    fields = dict(zip(lines.get(2, "").split("\t"), lines.get(3, "").split("\t")))
+    separator = _separator(lines[4])
+    fields = dict(zip(lines.get(2, "").split(separator), lines.get(3, "").split(separator)))
     fields = {name.strip().lower(): value.strip() for name, value in fields.items()}
-    heads = [cell.strip() for cell in lines[4].rstrip("\r\n").split("\t")]
+    heads = [cell.strip() for cell in lines[4].rstrip("\r\n").split(separator)]
     if len(heads) < 3 or heads[0].lower() not in ("frame#", "frame") or heads[1].lower() != "time":
         raise SignfaceError("the TRC file has no line of marker names", file=file, hint="export it again")
     declared = fields.get("nummarkers", "")
     named = sum(1 for name in heads[2:] if name)
+    if separator is None or (all(heads[2:]) and declared == str(named) and named > 1):
+        heads = [*heads[:2], *(cell for name in heads[2:] for cell in (name, "", ""))]  # a name each, not one in three
     markers = int(declared) if declared.isdigit() else named
     if markers < named:  # the rows have as many cells as markers are named, or they are refused for it
         note = doubt(file, f"names {named} markers and NumMarkers says {declared}: the names were believed")
@@ -76,7 +85,7 @@ def open_trc(path: str | PathLike[str], *, unit: str | None = None, rate: float 
         raise SignfaceError(f"the TRC file names none of its {markers} markers", file=file, hint="export it again")
     if len(heads) < 2 + 3 * (markers - 1) + 1:
         raise SignfaceError(f"the TRC file declares {markers} markers and names {sum(map(bool, names))}", file=file)
-    rows = TextRows(text, int(np.searchsorted(text.line_numbers, 6)), 2 + 3 * markers, "\t")
+    rows = TextRows(text, int(np.searchsorted(text.line_numbers, 6)), 2 + 3 * markers, separator)
     declared_rate = _float(fields.get("datarate", ""))
     clock = Clock(rate, 0.0) if rate else declared_clock(declared_rate, rows.column(1), file, name="DataRate")
     stated = fields.get("numframes", "")
