@@ -1,4 +1,6 @@
-"""CSV with one row a frame: `time_s` (a column `frame` may stand before it), then `LABEL_x, LABEL_y, LABEL_z` for each marker.
+"""CSV with one row a frame: `time_s`, then `LABEL_x, LABEL_y, LABEL_z` for each marker.
+
+A column `frame` may stand before the times.
 
 - `open_table`, `write_table`.
 """
@@ -31,7 +33,7 @@ FRAME = re.compile(r"^(frame|frame ?(number|no|nr|id|#)|#)\.?$", re.I)
 
 
 def _time_column(columns: list[str]) -> int:
-    """The number of the column of times: the first, or the second after one of frames' numbers; -1 where there is none."""
+    """The number of the column of times: the first, or the one after frames' numbers; -1 where there is none."""
     after_frames = len(columns) > 1 and FRAME.match(columns[0]) and TIME.match(columns[1])
     return 1 if after_frames else 0 if columns and TIME.match(columns[0]) else -1
 

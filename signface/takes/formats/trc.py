@@ -1,8 +1,8 @@
 """TRC, Motion Analysis' text format of trajectories, also written by OpenSim, Cortex and OptiTrack.
 
 Five lines of header: `PathFileType 4 (X/Y/Z) name`; the names of the fields (`DataRate`, `NumFrames`, `Units`, ...);
-their values; `Frame# Time` and the marker names, one for every three columns; `X1 Y1 Z1 ...`. Then a row a frame. Cells are
-separated by tabs; commas and blanks, which other programs put there, are read too.
+their values; `Frame# Time` and the marker names, one for every three columns; `X1 Y1 Z1 ...`. Then a row a frame. Cells
+are separated by tabs; commas and blanks, which other programs put there, are read too.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def _float(word: str) -> float:
 
 
 def _separator(names: str) -> str | None:
-    """What separates the cells of the line of names: tabs, in files that people have edited commas, or blanks (None)."""
+    """What separates the cells of the line of names: tabs, in files of other programs commas, or blanks (None)."""
     return next((sign for sign in ("\t", ",", ";") if sign in names), None)
 
 
