@@ -161,7 +161,9 @@ def _check_files(into: Path | None, options: EafOptions) -> None:
         from signface.elan.checking import check_document
         from signface.elan.document import read_document
 
-        check_document(read_document(there).getroot(), Path(there))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SignfaceWarning)  # what is harmless is said when the file is written
+            check_document(read_document(there).getroot(), Path(there))
 
 
 def _warn_of_affect(takes: list[Path], classifier: str) -> None:
