@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import os
 import sys
 import warnings
 from collections.abc import Callable, Mapping
@@ -88,11 +89,15 @@ def run(arguments: argparse.Namespace) -> int:
         raise SignfaceError("no such video", file=arguments.video)
     if arguments.into is not None and len(takes) > 1:
         raise SignfaceError("--into names one file", hint="annotate the takes one by one")
+    if arguments.into is not None and arguments.output is not None:
+        raise SignfaceError("--into and --output exclude each other", hint="--into writes into the file that it names")
     options = settings_from(arguments, EafOptions)
     if arguments.into is not None and getattr(arguments, "eaf_template", None) is not None:
         raise SignfaceError("--into and --template exclude each other", hint="the file of --into has its own tiers")
     files = [arguments.into] if arguments.into is not None else output_files(takes, arguments.output, ".eaf")
     _check_files(arguments.into, options)
+    if arguments.into is None and len(files) == 1:  # of several, each says it, and the others are annotated
+        _check_place(files[0], replace=arguments.replace)
     channels: bool | Mapping[str, Any] = False
     if options.channels is not None:  # pandas comes with it, which is otherwise imported beside the solve
         from signface.channels.rules import read_channels
@@ -164,6 +169,17 @@ def _check_files(into: Path | None, options: EafOptions) -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SignfaceWarning)  # what is harmless is said when the file is written
             check_document(read_document(there).getroot(), Path(there))
+
+
+def _check_place(file: Path, *, replace: bool) -> None:
+    """Say before anything is solved that the result cannot be written."""
+    if file.exists():
+        from signface.elan.writing import check_writable
+
+        check_writable(file, replace=replace)
+    there = next(place for place in (file, *file.absolute().parents) if place.exists())  # folders are made
+    if not os.access(there, os.W_OK):
+        raise SignfaceError("cannot be written", file=file, hint="choose a folder you may write to")
 
 
 def _warn_of_affect(takes: list[Path], classifier: str) -> None:
