@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from signface.content import Content
 from signface.takes.rigid import apply, flatness, inverse, rigid_transforms
 
 #: Fewer markers do not tell which of them is wrong.
@@ -32,8 +33,8 @@ FAR_MM, FAR = 60.0, 12.0
 STILLEST_MM = 1.0
 
 
-@dataclass(frozen=True)
-class UsualPlaces:
+@dataclass(frozen=True, eq=False)
+class UsualPlaces(Content):
     """Where markers usually are on the head.
 
     Parameters

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.real_boundaries import annotated_times, by_others, counts, edges, judged_boundaries, middles
+from benchmarks.real_boundaries import annotated_times, by_others, counts, edges, found_in, judged_boundaries, middles
 from signface.descriptors import Descriptors
 from signface.metrics.segmentation import match_times
 from signface.segmentation.segments import Segments
@@ -20,7 +20,8 @@ def takes(signers: tuple[str, ...] = ("S1", "S2")) -> list:
 
 
 def test_what_is_found_where_it_is_annotated_is_matched_and_chance_is_less():
-    parts = counts(takes(), edges, 0.1)
+    made = takes()
+    parts = counts(made, *found_in(made, [edges]), 0.1)
     assert parts.shape == (2, 5)
     np.testing.assert_array_equal(parts[:, :3], [[16, 16, 16]] * 2)
     assert (parts[:, 3] < 10).all()
@@ -41,15 +42,17 @@ def test_what_the_ends_of_a_take_cut_off_is_no_boundary():
 
 
 def test_thresholds_are_chosen_on_the_others():
-    """Each signer's are those that suit the other: here a way of finding that is told by its options alone."""
+    """Each signer's are those that suit the other: here a way that finds everything, and one that finds nothing."""
     mine, others = takes(("S1",)), takes(("S2",))
 
-    def find(take: Descriptors, *, prominence: float = 0.15, **options: float) -> np.ndarray:
-        return edges(take) if prominence == 0.5 else np.array([0.01])
+    def nothing(take: Descriptors) -> np.ndarray:
+        return np.array([0.01])
 
-    found = by_others([*mine, *others], None, find, 0.1)
+    both = [*mine, *others]
+    found = by_others(both, found_in(both, [nothing, edges]), None, [], 0.1)
     np.testing.assert_array_equal(found[:, :3], [[16, 16, 16]] * 2)
-    np.testing.assert_array_equal(by_others(mine, others, find, 0.1), found[:1])
+    ways, ways_of_others = (found_in(side, [nothing, edges]) for side in (mine, others))
+    np.testing.assert_array_equal(by_others(mine, ways, others, ways_of_others, 0.1), found[:1])
 
 
 def test_the_table_says_the_counts():
