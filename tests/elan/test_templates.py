@@ -391,9 +391,7 @@ def test_times_that_elan_opens_all_the_same_are_said_and_kept(lab, slots, messag
         write_eaf(labelled(), into=lab, signer="S9")
     after = etree.parse(str(lab)).getroot()
     assert "affect@S9" in [tier.get("TIER_ID") for tier in after.iter("TIER")]
-    values, kept = (
-        {t.get("TIER_ID"): "".join(t.itertext()).split() for t in root.iter("TIER")} for root in (before, after)
-    )
+    texts = [{t.get("TIER_ID"): "".join(t.itertext()).split() for t in r.iter("TIER")} for r in (before, after)]
     assert texts[0].items() <= texts[1].items()
 
 
