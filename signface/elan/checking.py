@@ -25,6 +25,9 @@ from signface.elan.document import NAMES, read_document
 from signface.elan.times import parent_annotations
 from signface.errors import SignfaceError, SignfaceWarning
 
+#: The attributes that tie an annotation to its times.
+ENDS = ("TIME_SLOT_REF1", "TIME_SLOT_REF2")
+
 
 @dataclass(frozen=True)
 class FileCheck:
@@ -89,19 +92,18 @@ def check_document(root: etree._Element, file: Path) -> None:
     SignfaceError
         The first problem and the number of others, in one line.
     """
-    problems = list(find_problems(root, of_times=False))
-    harmless = [problem for problem in find_problems(root) if problem not in problems]
-    if harmless and not problems:  # ELAN opens such a file, and nothing of it is touched
-        more = f" (and {len(harmless) - 1} more)" if len(harmless) > 1 else ""
-        warnings.warn(f"{file}: {harmless[0]}{more}; it stays as it is", SignfaceWarning, stacklevel=3)
-    if problems:
-        more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-        raise SignfaceError(
-            f"{problems[0]}{more}", file=file, hint="see them all with signface elan check, and mend them in ELAN"
-        )
+    if problems := list(_of_references(root)):
+        hint = "see them all with signface elan check, and mend them in ELAN"
+        raise SignfaceError(_first(problems), file=file, hint=hint)
+    if harmless := list(_of_times(root, None)):  # ELAN opens such a file, and nothing of it is touched
+        warnings.warn(f"{file}: {_first(harmless)}; it stays as it is", SignfaceWarning, stacklevel=3)
 
 
-def find_problems(root: etree._Element, *, media_ms: float | None = None, of_times: bool = True) -> Iterator[str]:
+def _first(problems: list[str]) -> str:
+    return f"{problems[0]} (and {len(problems) - 1} more)" if len(problems) > 1 else problems[0]
+
+
+def find_problems(root: etree._Element, *, media_ms: float | None = None) -> Iterator[str]:
     """Problems of a document, each as a short clause.
 
     Duplicate identifiers, dangling references, rings of dependent annotations, annotations that do not end after
@@ -113,12 +115,16 @@ def find_problems(root: etree._Element, *, media_ms: float | None = None, of_tim
         What `document.read_document` returns.
     media_ms : float, optional
         Length of the media in milliseconds; annotations that end after it are named.
-    of_times : bool
-        Name annotations that overlap or do not end after they start.
     """
+    yield from _of_references(root)
+    yield from _of_times(root, media_ms)
+
+
+def _of_references(root: etree._Element) -> Iterator[str]:
+    """What nothing can be written into: identifiers, names and references."""
     yield from _duplicates(root)
     yield from _dangling_names(root)
-    yield from _annotations(root, media_ms, of_times)
+    yield from _annotations(root)
 
 
 def _duplicates(root: etree._Element) -> Iterator[str]:
@@ -164,15 +170,14 @@ def _dangling_names(root: etree._Element) -> Iterator[str]:
             yield f"the vocabulary value {value.text} is in the language {value.get('LANG_REF')}, which is not there"
 
 
-def _annotations(root: etree._Element, media_ms: float | None, of_times: bool) -> Iterator[str]:
-    slots = {slot.get("TIME_SLOT_ID"): slot.get("TIME_VALUE") for slot in root.iterfind("TIME_ORDER/TIME_SLOT")}
+def _annotations(root: etree._Element) -> Iterator[str]:
+    slots = {slot.get("TIME_SLOT_ID") for slot in root.iterfind("TIME_ORDER/TIME_SLOT")}
     parents = parent_annotations(root)
     known = {annotation.get("ANNOTATION_ID") for annotation in root.iterfind("TIER/ANNOTATION/*")}
     for tier in root.iterfind("TIER"):
         name = tier.get("TIER_ID")
         if any(len(annotation) == 0 for annotation in tier.iterfind("ANNOTATION")):
             yield f"an annotation on tier {name} is empty: it has neither times nor a parent"
-        spans = []
         for annotation in tier.iterfind("ANNOTATION/*"):
             identifier = annotation.get("ANNOTATION_ID")
             if annotation.tag == "REF_ANNOTATION":
@@ -183,13 +188,20 @@ def _annotations(root: etree._Element, media_ms: float | None, of_times: bool) -
                 if _in_a_ring(identifier, parents):
                     yield f"the annotation {identifier} depends on itself"
                 continue
-            ends = [annotation.get("TIME_SLOT_REF1"), annotation.get("TIME_SLOT_REF2")]
-            missing = [slot for slot in ends if slot not in slots]
+            missing = [slot for end in ENDS if (slot := annotation.get(end)) not in slots]
             if missing:
                 yield f"the annotation {identifier} refers to the time slot {missing[0]}, which is not there"
-                continue
-            start, end = (slots[slot] for slot in ends)
-            if start is None or end is None or not of_times:
+
+
+def _of_times(root: etree._Element, media_ms: float | None) -> Iterator[str]:
+    """Annotations that overlap, do not end after they start, or end after the media."""
+    slots = {slot.get("TIME_SLOT_ID"): slot.get("TIME_VALUE") for slot in root.iterfind("TIME_ORDER/TIME_SLOT")}
+    for tier in root.iterfind("TIER"):
+        name, spans = tier.get("TIER_ID"), []
+        for annotation in tier.iterfind("ANNOTATION/ALIGNABLE_ANNOTATION"):
+            identifier = annotation.get("ANNOTATION_ID")
+            start, end = (slots.get(annotation.get(place)) for place in ENDS)
+            if start is None or end is None:
                 continue
             if int(start) >= int(end):
                 yield f"the annotation {identifier} on tier {name} does not end after it starts ({start} ms)"

@@ -69,5 +69,6 @@ def doubts(responses: Responses) -> list[str]:
 
 
 def listed(names: Sequence[str]) -> str:
+    """The first `SPELT_OUT` names, and how many more there are."""
     head = ", ".join(str(name) for name in names[:SPELT_OUT])
     return head + (f" and {len(names) - SPELT_OUT} more" if len(names) > SPELT_OUT else "")

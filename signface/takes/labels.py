@@ -10,6 +10,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Sequence
+from pathlib import Path
 
 from signface.errors import SignfaceError
 from signface.marker_names import SMALLEST_MATCH, SeveralSigners, by_subject, folded, signers_among, stripped
@@ -54,6 +55,20 @@ def clean_labels(labels: Sequence[str]) -> tuple[list[int], list[str], list[str]
         notes.append(f"ignored {unlabelled} unlabelled point{'s' * (unlabelled > 1)}")
     if repeated:
         notes.append(f"numbered repeated labels: {', '.join(sorted(repeated)[:5])}")
+    return kept, names, notes
+
+
+def kept_labels(labels: Sequence[str], file: Path, *, what: str = "markers") -> tuple[list[int], list[str], list[str]]:
+    """As `clean_labels`, of a file in which something must have a label.
+
+    Raises
+    ------
+    SignfaceError
+        Nothing has one.
+    """
+    kept, names, notes = clean_labels(labels)
+    if not kept:
+        raise SignfaceError(f"none of the {what} has a label", file=file, hint="label the markers")
     return kept, names, notes
 
 

@@ -19,7 +19,7 @@ from signface.files import reading, whole_file
 from signface.takes.formats.c3d_structure import MOST_FRAMES, Structure, read_structure
 from signface.takes.formats.registry import FileHead, register_format
 from signface.takes.formats.units import in_millimetres
-from signface.takes.labels import clean_labels
+from signface.takes.labels import kept_labels
 from signface.takes.recording import TakeFile
 from signface.takes.take import Take
 
@@ -62,9 +62,7 @@ def open_c3d(path: str | PathLike[str], *, unit: str | None = None) -> TakeFile:
     if structure.rate == 0:
         raise SignfaceError("the C3D file has the rate 0", file=file, hint="set POINT:RATE to its frames per second")
     labels = structure.labels + [""] * (structure.points - len(structure.labels))
-    kept, names, notes = clean_labels(labels[: structure.points])
-    if not kept:
-        raise SignfaceError("none of the points in the C3D file has a label", file=file, hint="label the markers")
+    kept, names, notes = kept_labels(labels[: structure.points], file, what="points in the C3D file")
     units = structure.units
     if len(units) > 1:
         units = [*units, *[units[-1]] * (structure.points - len(units))]

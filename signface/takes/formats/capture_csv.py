@@ -8,8 +8,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from itertools import pairwise
+from collections.abc import Iterator, Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -17,14 +16,16 @@ import numpy as np
 
 from signface.errors import SignfaceError
 from signface.takes.formats.registry import FileHead, register_format
-from signface.takes.formats.text import TextFile, TextRows, header_cells, marker_rows
+from signface.takes.formats.text import ROWS, TextFile, TextRows, header_cells, marker_rows, number_or_nan
 from signface.takes.formats.timing import Clock, declared_clock
-from signface.takes.labels import clean_labels
+from signface.takes.labels import kept_labels
 from signface.takes.recording import TakeFile
 from signface.takes.take import Take
 
 #: The sections of Nexus's files, each begun by a line that holds its name alone.
 SECTIONS = ("trajectories", "devices", "model outputs", "joints", "segments", "events")
+#: A line with the name of a section is no longer than this, with separators for every column behind it.
+LONGEST_NAME = 400
 #: More lines than these stand over no rows of numbers.
 LONGEST_HEADER = 12
 #: Columns of positions that Motive gives to markers; rigid bodies and bones have some, too.
@@ -32,7 +33,7 @@ MARKER_TYPES = ("marker", "rigid body marker", "bone marker")
 
 
 def _cells(line: str) -> list[str]:
-    return [cell.strip() for cell in header_cells(line)[0]]
+    return header_cells(line)[0]
 
 
 def _alone(line: str) -> str:
@@ -46,15 +47,18 @@ def _triples(axes: Sequence[str]) -> list[int]:
     return [number for number in range(len(low) - 2) if low[number : number + 3] == ["x", "y", "z"]]
 
 
-def _number(cell: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        return math.nan
+def _sections(text: TextFile) -> Iterator[tuple[int, str]]:
+    """Number among the lines, and name, of each line that begins a section; a piece of the file at a time."""
+    for begin in range(0, len(text), ROWS):
+        for number, (_, line) in enumerate(text.lines(begin, begin + ROWS), begin):
+            if len(line) < LONGEST_NAME and _alone(line) in SECTIONS:
+                yield number, _alone(line)
 
 
 def _is_nexus(head: FileHead) -> float:
-    return 0.9 * (len(head.lines) > 2 and _alone(head.lines[0]) in SECTIONS and _number(_alone(head.lines[1])) > 0)
+    return 0.9 * (
+        len(head.lines) > 2 and _alone(head.lines[0]) in SECTIONS and number_or_nan(_alone(head.lines[1])) > 0
+    )
 
 
 @register_format(
@@ -85,8 +89,7 @@ def open_nexus(path: str | PathLike[str], *, unit: str | None = None, rate: floa
     """
     file = Path(path)
     text = TextFile(file)
-    begun = [(number, _alone(line)) for number, (_, line) in enumerate(text.lines(0, len(text))) if len(line) < 400]
-    sections = [(number, word) for number, word in begun if word in SECTIONS]
+    sections = list(_sections(text))
     first = next((number for number, word in sections if word == "trajectories"), None)
     if first is None:
         raise SignfaceError("holds no trajectories", file=file, hint="export them from Nexus (Export ASCII)")
@@ -97,7 +100,7 @@ def open_nexus(path: str | PathLike[str], *, unit: str | None = None, rate: floa
     header = [line for _, line in text.lines(first + 1, first + 5)]
     if len(header) < 4 or not _cells(header[2])[0].lower().startswith("frame"):
         raise SignfaceError("has no header of trajectories", file=file, hint="export it again from Nexus, or as C3D")
-    declared, names, axes, units = _number(_alone(header[0])), *(_cells(line) for line in header[1:])
+    declared, names, axes, units = number_or_nan(_alone(header[0])), *(_cells(line) for line in header[1:])
     places = _triples(axes)
     labels = [names[place] if place < len(names) else "" for place in places]
     rows = TextRows(text, first + 5, len(axes), header_cells(header[2])[1])
@@ -111,7 +114,8 @@ def open_nexus(path: str | PathLike[str], *, unit: str | None = None, rate: floa
 
 
 def _motive_header(head: Sequence[str]) -> dict[str, str]:
-    return {name.lower(): value for name, value in pairwise(_cells(head[0]))} if head else {}
+    cells = _cells(head[0]) if head else []
+    return {name.lower(): value for name, value in zip(cells[::2], cells[1::2], strict=False)}
 
 
 def _is_motive(head: FileHead) -> float:
@@ -164,7 +168,7 @@ def open_motive(path: str | PathLike[str], *, unit: str | None = None, rate: flo
     if not places:
         raise SignfaceError("has no markers", file=file, hint="tick Markers when you export from Motive, or export C3D")
     rows = TextRows(text, last + 1, width, header_cells(header[last])[1])
-    declared = _number(fields.get("export frame rate", fields.get("capture frame rate", "")))
+    declared = number_or_nan(fields.get("export frame rate", fields.get("capture frame rate", "")))
     clock = Clock(rate, 0.0) if rate else declared_clock(declared, rows.column(1), file, name="Export Frame Rate")
     units = fields.get("length units")
     return _recording(rows, places, [names[p] for p in places], clock, units, unit, "OptiTrack Motive CSV")
@@ -181,9 +185,7 @@ def _recording(
 ) -> TakeFile | Take:
     """Rows of numbers with x, y and z of each marker from `places` on."""
     file = rows.text.file
-    kept, names, notes = clean_labels(labels)
-    if not kept:
-        raise SignfaceError("none of the markers has a label", file=file, hint="label the markers")
+    kept, names, notes = kept_labels(labels, file)
     columns = np.array([places[number] for number in kept])[:, None] + np.arange(3)
     history = (f"read {file.name} ({title})", *notes)
     return marker_rows(rows, columns, names, clock, units=units, unit=unit, history=history)

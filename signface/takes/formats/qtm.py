@@ -19,7 +19,7 @@ from signface.takes.formats.doubts import doubt
 from signface.takes.formats.registry import FileHead, register_format
 from signface.takes.formats.text import TextFile, TextRows, marker_rows
 from signface.takes.formats.timing import Clock, declared_clock
-from signface.takes.labels import clean_labels
+from signface.takes.labels import kept_labels
 from signface.takes.recording import TakeFile
 from signface.takes.take import Take
 
@@ -95,9 +95,7 @@ def open_qtm(path: str | PathLike[str], *, unit: str | None = None, rate: float 
     if not before and extra in (1, 2):
         before, time_at = extra, extra - 1  # (frame and) time without a line of column names
     table = TextRows(text, length, before + 3 * markers, "\t")
-    kept, labels, notes = clean_labels(names)
-    if not kept:
-        raise SignfaceError("none of the markers in the TSV file has a label", file=file, hint="label the markers")
+    kept, labels, notes = kept_labels(names, file, what="markers in the TSV file")
     times = None if time_at is None else table.column(time_at)
     if times is not None and extra == 1 and time_at == 0 and (np.diff(times) == np.round(np.diff(times))).all():
         times = None  # numbers of frames

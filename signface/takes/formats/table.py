@@ -18,7 +18,7 @@ from signface.files import whole_file
 from signface.takes.formats.registry import FileHead, register_format
 from signface.takes.formats.text import TextFile, TextRows, header_cells, marker_rows
 from signface.takes.formats.timing import Clock, read_clock
-from signface.takes.labels import clean_labels
+from signface.takes.labels import kept_labels
 from signface.takes.recording import TakeFile
 from signface.takes.take import Take
 
@@ -97,9 +97,7 @@ def open_table(path: str | PathLike[str], *, unit: str | None = None, rate: floa
     labels, coordinates = _markers(columns, timed + 1, file)
     rows = TextRows(text, 1, len(columns), separator)
     clock = Clock(rate, 0.0) if rate else read_clock(rows.column(timed), file, heading=columns[timed])
-    kept, names, notes = clean_labels(labels)
-    if not kept:
-        raise SignfaceError("none of the markers has a label", file=file, hint="label the markers")
+    kept, names, notes = kept_labels(labels, file)
     return marker_rows(
         rows,
         coordinates[kept],

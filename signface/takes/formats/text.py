@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import BinaryIO
@@ -43,6 +44,20 @@ def header_cells(line: str) -> tuple[list[str], str]:
     """
     separator = max((",", ";", "\t"), key=line.count)
     return [cell.strip() for cell in next(csv.reader(line.splitlines(), delimiter=separator), [])], separator
+
+
+def number_or_nan(cell: str) -> float:
+    """A number of a header, with a decimal point or comma; NaN where it is none.
+
+    Examples
+    --------
+    >>> number_or_nan("59,94"), number_or_nan("Hz")
+    (59.94, nan)
+    """
+    try:
+        return float(cell.replace(",", "."))
+    except ValueError:
+        return math.nan
 
 
 def read_text(file: Path) -> str:

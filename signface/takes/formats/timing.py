@@ -28,8 +28,8 @@ UNITS |= {"ticks of 100 ns": 1e-7, "nanoseconds": 1e-9}
 #: Rates at which cameras run (Hz), within a hundredth.
 CAMERAS: tuple[float, ...] = (10, 12, 12.5, 15, 16, 20, 24, 25, 30, 40, 48, 50, 60, 75, 80, 90, 100, 120, 125)
 CAMERAS += (144, 150, 160, 200, 240, 250, 300, 320, 360, 400, 480, 500, 600, 1000)
-#: Times beyond this many seconds (15 years) count from a date; beyond this many (4 hours) perhaps from midnight.
-FROM_A_DATE, FROM_MIDNIGHT = 4.7e8, 14400.0
+#: Times beyond this many seconds (15 years) count from a date.
+FROM_A_DATE = 4.7e8
 DAY = 86400.0
 #: In steps: how far a row may lie from an even clock before frames are resampled, and how long a gap is left.
 EVEN, GAP = 0.35, 2.5

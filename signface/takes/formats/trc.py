@@ -7,7 +7,6 @@ are separated by tabs; commas and blanks, which other programs put there, are re
 
 from __future__ import annotations
 
-import math
 from os import PathLike
 from pathlib import Path
 
@@ -16,18 +15,11 @@ import numpy as np
 from signface.errors import SignfaceError
 from signface.takes.formats.doubts import doubt
 from signface.takes.formats.registry import register_format
-from signface.takes.formats.text import TextFile, TextRows, marker_rows
+from signface.takes.formats.text import TextFile, TextRows, marker_rows, number_or_nan
 from signface.takes.formats.timing import Clock, declared_clock
-from signface.takes.labels import clean_labels
+from signface.takes.labels import kept_labels
 from signface.takes.recording import TakeFile
 from signface.takes.take import Take
-
-
-def _float(word: str) -> float:
-    try:
-        return float(word.replace(",", "."))
-    except ValueError:
-        return math.nan
 
 
 def _separator(names: str) -> str | None:
@@ -86,15 +78,13 @@ def open_trc(path: str | PathLike[str], *, unit: str | None = None, rate: float 
     if len(heads) < 2 + 3 * (markers - 1) + 1:
         raise SignfaceError(f"the TRC file declares {markers} markers and names {sum(map(bool, names))}", file=file)
     rows = TextRows(text, int(np.searchsorted(text.line_numbers, 6)), 2 + 3 * markers, separator)
-    declared_rate = _float(fields.get("datarate", ""))
+    declared_rate = number_or_nan(fields.get("datarate", ""))
     clock = Clock(rate, 0.0) if rate else declared_clock(declared_rate, rows.column(1), file, name="DataRate")
     stated = fields.get("numframes", "")
     doubts = []
     if stated.isdigit() and int(stated) != len(rows):
         doubts = [doubt(file, f"has {len(rows)} frames and NumFrames says {stated}: it was cut, or is cut short")]
-    kept, labels, notes = clean_labels(names)
-    if not kept:
-        raise SignfaceError("none of the markers in the TRC file has a label", file=file, hint="label the markers")
+    kept, labels, notes = kept_labels(names, file, what="markers in the TRC file")
     return marker_rows(
         rows,
         np.array(kept)[:, None] * 3 + np.arange(2, 5),
